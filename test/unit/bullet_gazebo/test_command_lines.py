@@ -1,14 +1,10 @@
 """The command lines of gzserver, gzclient, gz and spawn_model, the paths of models, imports of 0.2."""
 
-import random
-
-import numpy as np
 import pytest
 from support.python import run_python
 
 from bullet_gazebo.clients import gz, gzclient, spawn_model, spawner
 from bullet_gazebo.clients.spawn_model import parse
-from bullet_gazebo.common.node_process import seed_random_numbers
 from bullet_gazebo.node import gzserver
 from bullet_gazebo.node.gzserver import parse_args
 from bullet_gazebo.services.spawn_services import model_paths
@@ -52,14 +48,6 @@ def test_the_environment_wins_over_a_launch_file(monkeypatch):
     assert args.world == "my.world"
 
 
-def test_the_seed_decides_random_numbers():
-    drawn = []
-    for _ in range(2):
-        seed_random_numbers(5)
-        drawn.append((random.random(), np.random.rand()))
-    assert drawn[0] == drawn[1]
-
-
 def test_negative_numbers_of_spawn_model():
     line = "-urdf -param p -model m -x -1e-05 -R -1.5 -J hinge -2e-1"
     options = parse(line.split())
@@ -95,9 +83,8 @@ def test_a_wrong_command_line_of_spawn_model_or_gz(command, line):
 @pytest.mark.parametrize("line", ["gz sdf -p robot.urdf", "gz model -m bot -i", "gz stats"])
 def test_another_tool_of_gz_says_what_there_is(line, capsys):
     assert gz.main(line.split()) == 2
-    told = capsys.readouterr().err
+    (told,) = capsys.readouterr().err.splitlines()
     assert f"there is no '{' '.join(line.split()[:2])}': " in told
-    assert told.count("\n") == 1
 
 
 def test_gz_without_a_master(monkeypatch, capsys):
@@ -193,12 +180,10 @@ def test_a_spawner_waits_while_a_model_is_being_spawned(monkeypatch, spawns, wai
         ("bullet_gazebo import Controller", "robot_sim.Controller"),
         ("bullet_gazebo.physics.world import World", "robot_sim.physics.world"),
         ("bullet_gazebo.control.pid import Pid", "robot_sim.control.pid"),
-        (
-            "bullet_gazebo.ros.plugins.plugin_loader import PluginContext",
-            "bullet_gazebo.plugins.plugin_loader",
-        ),
+        ("bullet_gazebo.ros.plugins.plugin_loader import PluginContext",
+         "bullet_gazebo.plugins.plugin_loader"),
     ],
-)
+)  # fmt: skip
 def test_an_old_import_says_where_it_is(old, new):
     name = old.split()[-1]
     there = f"from {new.removesuffix(f'.{name}')} import {name} as there"

@@ -43,12 +43,12 @@ def test_two_wheels_drive_straight_and_turn_as_commanded(fine_or_coarse):
     track.spawn(diff_drive())
     track.advance(ticks // 2)
     start = track.model.state()[0].position
-    track.command(0.2, 0.0)
-    track.advance(5 * ticks)
+    track.command(0.4, 0.0)
+    track.advance(5 * ticks // 2)
     x, y, _ = track.model.state()[0].position
     assert (x - start[0], y) == pytest.approx((1.0, 0.0), abs=0.02)
-    track.command(0.0, 1.0)
-    assert track.turned(round(2.0 * math.pi * ticks)) == pytest.approx(2.0 * math.pi, rel=0.03)
+    track.command(0.0, 2.0)
+    assert track.turned(round(math.pi * ticks)) == pytest.approx(2.0 * math.pi, rel=0.03)
 
 
 def test_a_circle_is_closed(track):
@@ -212,8 +212,8 @@ def test_four_wheels_drive_straight_and_turn_by_slipping(track):
     elements = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "torque": 20}
     track.spawn(four_wheels(**{"libgazebo_ros_skid_steer_drive.so": elements}))
     track.advance(500)
-    track.command(0.2, 0.0)
-    track.advance(5000)
+    track.command(0.4, 0.0)
+    track.advance(2500)
     assert track.model.state()[0].position[0] == pytest.approx(1.0, abs=0.02)
     track.command(0.0, 1.0)
     assert 0.1 < track.turned(1000) < 1.0
@@ -278,8 +278,8 @@ def test_a_tricycle_steers_by_its_front_wheel(track, speed):
     angle = 0.5
     track.command(0.2, angle)
     track.advance(1000)
-    turned = track.turned(3000)
-    assert turned == pytest.approx(3.0 * 0.2 * math.sin(angle) / WHEELBASE, rel=0.1)
+    turned = track.turned(1500)
+    assert turned == pytest.approx(1.5 * 0.2 * math.sin(angle) / WHEELBASE, rel=0.1)
     state = track.messages["/joint_states"][-1]
     assert state.name == ["front_steering", "front_joint", "left_joint", "right_joint"]
     assert state.position[0] == pytest.approx(angle, abs=0.02)

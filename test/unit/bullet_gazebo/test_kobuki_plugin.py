@@ -74,14 +74,14 @@ def test_a_kobuki_drives_for_its_time_out_and_measures_itself(track):
 
 
 def test_a_kobuki_tells_of_bumps_and_cliffs_once(track):
-    track.sim.world.spawn("wall", parse_sdf(WALL), Pose((0.5, 0.0, 0.5)))
+    track.sim.world.spawn("wall", parse_sdf(WALL), Pose((0.35, 0.0, 0.5)))
     track.spawn(kobuki(**DROPS), height=RADIUS - 0.001)
     track.advance(300)
     events = ("bumper", "cliff", "wheel_drop")
     bumps, cliffs, drops = (track.messages[f"/mobile_base/events/{each}"] for each in events)
     assert bumps == cliffs == []
     assert not any(core.wheel_drop for core in track.messages["/mobile_base/sensors/core"][-5:])
-    for _ in range(4):
+    for _ in range(2):
         track.command(0.2, 0.0, "/mobile_base/commands/velocity")
         track.advance(500)
     assert bumps[0] == BumperEvent(BumperEvent.CENTER, BumperEvent.PRESSED)

@@ -116,10 +116,18 @@ def test_a_subscriber_that_comes_while_the_last_one_goes_is_counted(monkeypatch)
     assert count.size == 1
 
 
-def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(monkeypatch) -> None:
+@pytest.fixture
+def action(monkeypatch) -> TrajectoryAction:
+    """One of a world in lock-step; its sim is the test's to change."""
     monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
     sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
-    action, goals = TrajectoryAction(sim, MagicMock(), "/arm"), (MagicMock(), MagicMock())
+    made = TrajectoryAction(sim, MagicMock(), "/arm")
+    made.sim = sim
+    return made
+
+
+def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(action) -> None:
+    goals = MagicMock(), MagicMock()
     for goal in goals:
         for second in range(100):
             stamp = second * 10**9
@@ -133,10 +141,8 @@ def test_only_the_newest_feedback_of_a_goal_waits_for_its_delivery(monkeypatch) 
         goal.set_succeeded.assert_called_once()
 
 
-def test_an_action_is_closed_after_the_result_that_a_step_delivers(monkeypatch) -> None:
-    monkeypatch.setattr(actions, "SteadyActionServer", MagicMock())
-    sim = SimpleNamespace(lock=FairLock(), outboxes=[], deliver_with_steps=True, sim_time=0.0)
-    action, order = TrajectoryAction(sim, MagicMock(), "/arm"), []
+def test_an_action_is_closed_after_the_result_that_a_step_delivers(action) -> None:
+    order = []
     action._server.stop.side_effect = lambda: order.append("closed")
     closer = threading.Thread(target=action.shutdown)
 
@@ -151,6 +157,6 @@ def test_an_action_is_closed_after_the_result_that_a_step_delivers(monkeypatch) 
     action.deliver()
     closer.join()
     assert order == ["told", "closed"]
-    sim.sim_time, before = 100.0, action._server.publish_status.call_count
+    action.sim.sim_time, before = 100.0, action._server.publish_status.call_count
     action.deliver()  # by a step that began before
     assert action._server.publish_status.call_count == before

@@ -143,8 +143,7 @@ def node(monkeypatch):
 def test_an_impossible_sensor_is_told_in_a_line(node, fault):
     of_link, of_the_model, words = BAD[fault]
     [line] = node.spawn(MODEL.format(of_link, of_the_model))
-    assert words in line
-    assert "\n" not in line
+    assert words in line and "\n" not in line
     assert node.sim.now == 4_000_000
 
 

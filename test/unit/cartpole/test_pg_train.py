@@ -1,7 +1,6 @@
 """The commands that train: the robot's own options, and those of ROS."""
 
 import json
-import socket
 from pathlib import Path
 from typing import Any
 
@@ -182,15 +181,16 @@ def test_rviz_where_it_cannot_be_is_one_line(monkeypatch, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_master_that_does_not_answer_or_can_not_be_reached_or_named(capsys, monkeypatch) -> None:
+def test_a_master_that_does_not_answer_or_can_not_be_reached_or_named(
+    nobody_answers, capsys, monkeypatch
+) -> None:
     pytest.importorskip("rospy")
-    with socket.create_server(("127.0.0.1", 0)) as deaf:
-        for master, reason in (
-            (f"http://127.0.0.1:{deaf.getsockname()[1]}", "no answer within"),
-            # 192.0.2.0/24 is reserved for documentation: nobody answers there.
-            ("http://192.0.2.1:11311", "no ROS master at http://192.0.2.1:11311"),
-            ("nonsense", "nonsense"),
-        ):
-            monkeypatch.setenv("ROS_MASTER_URI", master)
-            assert reason in failed(capsys, "--run-dir=run")
+    for master, reason in (
+        (nobody_answers, "no answer within"),
+        # 192.0.2.0/24 is reserved for documentation: nobody answers there.
+        ("http://192.0.2.1:11311", "no ROS master at http://192.0.2.1:11311"),
+        ("nonsense", "nonsense"),
+    ):
+        monkeypatch.setenv("ROS_MASTER_URI", master)
+        assert reason in failed(capsys, "--run-dir=run")
     assert not Path("run").exists()

@@ -1,7 +1,5 @@
 """The command policy_node.py: what it makes of its arguments, and which policies it takes."""
 
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -123,9 +121,3 @@ def test_a_policy_behind_a_wrapper_is_refused_before_there_is_an_environment(
     path = tmp_path if opens == "open_run" else tmp_path / "policy.pt"
     with pytest.raises(RobotEnvError, match="learned through the wrapper mine:wrap"):
         policy_node.load(path, "best", {})
-
-
-def test_help_waits_for_no_torch() -> None:
-    code = "import sys, cartpole.policy_node; print('torch' in sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout.split() == ["False"]

@@ -1,9 +1,9 @@
 """A command's own flags and ROS's: looked at only where ROS has started the command."""
 
-import subprocess
 import sys
 
 import pytest
+from support.python import run_python
 
 from cartpole.workbench import ros_options
 from robot_envs.backends.ros import node
@@ -30,13 +30,7 @@ def test_without_ross_options_the_arguments_are_the_flags_and_ros_is_not_loaded(
         "print(ros_options(['--seed=3', 'x'], 'learner'),"
         " [m for m in ('rospy', 'rosgraph', 'roslib', 'genpy', 'ros_utils') if m in sys.modules])"
     )
-    shown = subprocess.run(
-        [sys.executable, "-c", script],
-        env={"PYTHONPATH": ":".join(entry for entry in sys.path if entry)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    shown = run_python(script, env={"PYTHONPATH": ":".join(filter(None, sys.path))})
     assert shown.stdout.strip() == "(['--seed=3', 'x'], {}, '/learner') []"
 
 

@@ -1,7 +1,5 @@
 """examples/dqn_from_saved_states.py saves a demonstration, and begins episodes in it."""
 
-import importlib
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,14 +9,12 @@ import pytest
 from cartpole.tasks import CartPoleState
 from rl_workbench import cli
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 ID = "SwingUpDiscrete-v0"
 
 
 @pytest.fixture
-def example(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.syspath_prepend(EXAMPLES)
-    made = importlib.import_module("dqn_from_saved_states")
+def example(imported, monkeypatch: pytest.MonkeyPatch) -> Any:
+    made = imported("dqn_from_saved_states")
     monkeypatch.setattr(made, "DEMONSTRATED", 12)
     monkeypatch.setattr(made, "PLANS", 4)
     gymnasium.register(ID, entry_point=made.make)

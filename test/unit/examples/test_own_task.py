@@ -1,6 +1,5 @@
 """examples/own_task.py is short, a regular environment, and known to the workbench."""
 
-import importlib
 import runpy
 import sys
 from pathlib import Path
@@ -16,9 +15,8 @@ LONGEST = 40  # [lines]
 
 
 @pytest.fixture
-def own_task(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.syspath_prepend(EXAMPLES)
-    return importlib.import_module("own_task")
+def own_task(imported) -> Any:
+    return imported("own_task")
 
 
 def test_it_is_short() -> None:

@@ -1,24 +1,19 @@
 """examples/plan_with_snapshots.py does what it plans for, and the same over ROS."""
 
-import importlib
 import itertools
 import sys
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
-
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def example(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.syspath_prepend(EXAMPLES)
-    return importlib.import_module("plan_with_snapshots")
+def example(imported) -> Any:
+    return imported("plan_with_snapshots")
 
 
 @pytest.mark.parametrize(

@@ -1,24 +1,19 @@
 """examples/rllib_ppo.py configures RLlib for the cart-pole; RLlib is a stand-in."""
 
-import importlib.util
 import sys
-from pathlib import Path
 from unittest.mock import MagicMock
 
 import pytest
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 RLLIB = ("ray", "ray.rllib", "ray.rllib.algorithms", "ray.rllib.algorithms.ppo", "ray.tune",
          "ray.tune.registry")  # fmt: skip
 
 
-def test_workers_make_the_cart_pole(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_make_the_cart_pole(imported, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in RLLIB:
         monkeypatch.setitem(sys.modules, name, MagicMock())
     monkeypatch.setattr(sys, "argv", ["rllib_ppo.py", "--iterations", "0"])
-    spec = importlib.util.spec_from_file_location("rllib_ppo", EXAMPLES / "rllib_ppo.py")
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
+    example = imported("rllib_ppo")
     example.main()
     name, make_env = example.register_env.call_args.args
     (chosen,), options = example.PPOConfig().environment.call_args

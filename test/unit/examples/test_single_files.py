@@ -4,7 +4,6 @@ The same options, given to a file and to `workbench.py train`, have to lead to t
 """
 
 import ast
-import importlib
 import json
 import runpy
 import sys
@@ -33,11 +32,6 @@ def kept_torch() -> Any:
     yield
     torch.set_num_threads(threads)
     torch.set_rng_state(state)
-
-
-def module(name: str, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(EXAMPLES)
-    return importlib.import_module(name.removesuffix(".py"))
 
 
 def trained(example: ModuleType, flags: list[str], folder: Path) -> tuple[Any, ...]:
@@ -89,8 +83,8 @@ DQN = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flags", DQN.values(), ids=DQN.keys())
-def test_dqn_comes_to_the_weights_of_the_library(flags: list[str], tmp_path, monkeypatch) -> None:
-    example = module("dqn_single_file", monkeypatch)
+def test_dqn_comes_to_the_weights_of_the_library(flags: list[str], tmp_path, imported) -> None:
+    example = imported("dqn_single_file")
     q_network, target_network, _, returns = trained(example, flags, tmp_path / "log")
     options = example.parse_args(flags)
     # As it comes: the file's defaults have to be those of config/dqn.yaml.
@@ -118,10 +112,8 @@ REINFORCE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flags", REINFORCE.values(), ids=REINFORCE.keys())
-def test_reinforce_comes_to_the_weights_of_the_library(
-    flags: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    example = module("reinforce_single_file", monkeypatch)
+def test_reinforce_comes_to_the_weights_of_the_library(flags, tmp_path: Path, imported) -> None:
+    example = imported("reinforce_single_file")
     policy, value, _, returns = trained(example, flags, tmp_path / "log")
     # On the robot the file's defaults have to be those of config/pg.yaml.
     options = example.parse_args(flags)
@@ -151,8 +143,8 @@ def test_it_runs_as_a_script(words: list[str], tmp_path: Path, monkeypatch, caps
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_help_explains_every_option(name: str, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    example = module(name, monkeypatch)
+def test_help_explains_every_option(name: str, imported, capsys) -> None:
+    example = imported(name.removesuffix(".py"))
     with pytest.raises(SystemExit) as ended:
         example.parse_args(["--help"])
     assert ended.value.code == 0

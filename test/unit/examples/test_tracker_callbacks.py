@@ -1,6 +1,5 @@
 """examples/*_callback.py log a training; the trackers are stand-ins that record what they are given."""
 
-import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -9,8 +8,6 @@ from typing import Any
 import pytest
 
 from rl_workbench import train
-
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 
 class Tracker(ModuleType):
@@ -37,32 +34,20 @@ class Tracker(ModuleType):
     [("WandbCallback", "init", "log", "finish"), ("MlflowCallback", "start_run", "log_metric", "end_run")],
 )  # fmt: skip
 def test_a_training_is_logged(
-    example: str,
-    made: str,
-    logged: str,
-    ended: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    example: str, made: str, logged: str, ended: str, imported, tmp_path: Path, monkeypatch
 ) -> None:
     name = example.removesuffix("Callback").lower()
     tracker = Tracker(name)
     monkeypatch.setitem(sys.modules, name, tracker)
-    file = EXAMPLES / f"{name}_callback.py"
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    train(
-        "dqn",
-        callbacks=[getattr(module, example)()],
-        env_id="CartPole-v1",
-        run_dir=tmp_path / "run",
-        total_timesteps=300,
-        eval_frequency=150,
-        eval_episodes=1,
-        confirm_episodes=1,
-        learning_starts=50,
-    )
+    callback = getattr(imported(f"{name}_callback"), example)()
+    short = {
+        "total_timesteps": 300,
+        "eval_frequency": 150,
+        "eval_episodes": 1,
+        "confirm_episodes": 1,
+    }
+    robot = {"env_id": "CartPole-v1", "learning_starts": 50, "run_dir": tmp_path / "run"}
+    train("dqn", callbacks=[callback], **robot, **short)
     names = [call[0] for call in tracker.calls]
     assert made in names and names[-1] == ended
     assert names.count(logged) >= 3  # episodes and two evaluations

@@ -54,13 +54,8 @@ def test_files_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "fault"),
-    [
-        ("loop", "Too many levels"),
-        ("gone", "No such file"),
-        ("x\0y", ""),
-        ("x" * 300, "File name too long"),
-    ],
-)
+    [("loop", "Too many levels"), ("gone", "No such file"), ("x\0y", ""), ("x" * 300, "File name too long")],
+)  # fmt: skip
 def test_a_file_that_cannot_be_read_says_why(tmp_path: Path, name: str, fault: str) -> None:
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(FileError, match=f"^it can't be read: {fault}"):

@@ -9,6 +9,7 @@ import threading
 from dataclasses import replace
 
 import pytest
+from support import python
 
 from file_access import expansion
 from file_access.expansion import LIMITS, CannotExpand, expand, included_files
@@ -89,8 +90,7 @@ def test_a_warning_is_told_once_with_its_first_place(bad, capfd):
         "warning: redefining global symbol: max",
     ]
     assert told.count("in file: ") == 2
-    program = [sys.executable, "-c", f"from file_access import expansion; {PROGRAM}", path]
-    done = subprocess.run(program, capture_output=True, text=True, check=True)
+    done = python.run_python(f"from file_access import expansion; {PROGRAM}", path)
     assert done.stderr == told and "<robot" in done.stdout
 
 
@@ -119,9 +119,7 @@ try:
 except CannotExpand as fault:
     print(fault)
 """
-    command = [sys.executable, "-c", script]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "of memory" in done.stdout
+    assert "of memory" in python.run_python(script).stdout
 
 
 @pytest.mark.slow
@@ -193,24 +191,20 @@ def program(*arguments, **constants):
 
 
 def run(*arguments, **constants):
-    return subprocess.run(
-        program(*arguments, **constants), capture_output=True, text=True, check=False, timeout=120
-    )
+    return python.run(program(*arguments, **constants))
 
 
 @pytest.mark.slow
 def test_the_program_writes_what_the_function_returns(bad, tmp_path):
     path = bad('<xacro:arg name="n" default="1"/><link name="l$(arg n)"/>')
-    done = run(path, "n:=7")
+    done, out = run(path, "n:=7"), tmp_path / "new" / "out.urdf"
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == expand(path, {"n": "7"})
-    assert run("-o", str(tmp_path / "new" / "out.urdf"), path, "n:=7").returncode == 0
-    assert (tmp_path / "new" / "out.urdf").read_text() == done.stdout
-    broken = run("-o", str(tmp_path / "new" / "out.urdf"), bad("${1/0}"))
-    assert broken.returncode == 2
-    assert (tmp_path / "new" / "out.urdf").read_text() == done.stdout
-    include = bad(f'<xacro:include filename="{tmp_path}/new/out.urdf"/>')
-    assert run("--deps", include).stdout == str(tmp_path / "new" / "out.urdf")
+    assert run("-o", str(out), path, "n:=7").returncode == 0
+    assert out.read_text() == done.stdout
+    assert run("-o", str(out), bad("${1/0}")).returncode == 2
+    assert out.read_text() == done.stdout
+    assert run("--deps", bad(f'<xacro:include filename="{out}"/>')).stdout == str(out)
 
 
 @pytest.mark.slow

@@ -13,10 +13,17 @@ HOLDER = """
 import sys
 from pathlib import Path
 from file_access import locks
-with locks.locked_folder(Path(sys.argv[1])):
-    print("locked", flush=True)
+with locks.{}(Path(sys.argv[1])) as folder:
+    print(folder, flush=True)
     sys.stdin.read()
 """
+
+
+def held(how: str, folder: Path) -> tuple[subprocess.Popen, str]:
+    """A process that holds a folder by a function of the module, and which one it has got."""
+    command = [sys.executable, "-c", HOLDER.format(how), folder]
+    holder = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    return holder, holder.stdout.readline().strip()
 
 
 def test_a_second_holder_is_refused_until_the_block_ends(tmp_path) -> None:
@@ -30,12 +37,9 @@ def test_a_second_holder_is_refused_until_the_block_ends(tmp_path) -> None:
 
 
 def test_a_lock_ends_with_its_process(tmp_path) -> None:
-    holder = subprocess.Popen(
-        [sys.executable, "-c", HOLDER, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
+    holder, told = held("locked_folder", tmp_path)
     with holder:
-        assert holder.stdout.readline() == b"locked\n"
-        assert is_locked(tmp_path)
+        assert told and is_locked(tmp_path)
         holder.kill()
     with locked_folder(tmp_path):
         pass
@@ -60,25 +64,11 @@ def test_what_is_missing_is_not_locked(tmp_path) -> None:
         pass
 
 
-MAKER = """
-import sys
-from file_access import locks
-with locks.scratch_folder(sys.argv[1]) as folder:
-    (folder / "file").write_text("")
-    print(folder, flush=True)
-    sys.stdin.read()
-"""
-
-
-def made(parent: Path) -> tuple[subprocess.Popen, Path]:
-    maker = subprocess.Popen(
-        [sys.executable, "-c", MAKER, parent], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    return maker, Path(maker.stdout.readline().decode().strip())
-
-
 def test_temporary_folders_of_killed_processes_go_with_the_next_one(tmp_path) -> None:
-    (lives, kept), (killed, left) = made(tmp_path), made(tmp_path)
+    (lives, kept), (killed, left) = (held("scratch_folder", tmp_path) for _ in range(2))
+    kept, left = Path(kept), Path(left)
+    for each in (kept, left):
+        (each / "file").touch()
     killed.send_signal(signal.SIGKILL)
     killed.wait()
     users, link = tmp_path / "results".join(SCRATCH), tmp_path / "far_away".join(SCRATCH)

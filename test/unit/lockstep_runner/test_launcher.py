@@ -1,10 +1,10 @@
 """lockstep.py's command line."""
 
 import os
-import subprocess
 import sys
 
 import pytest
+from support.python import run
 
 from lockstep_runner.launcher import _parse
 from lockstep_runner.script import AfterImport, seed_everything
@@ -15,12 +15,7 @@ from lockstep_runner.script import AfterImport, seed_everything
     [
         (["a.py", "--seed", "5"], None, "a.py", ["--seed", "5"]),
         (["--step-on", "/t", "a.py", "x"], ["/t"], "a.py", ["x"]),
-        (
-            ["--step-on", "/t", "/s", "a.py", "--step-on", "x"],
-            ["/t", "/s"],
-            "a.py",
-            ["--step-on", "x"],
-        ),
+        (["--step-on", "/t", "/s", "a.py", "--step-on"], ["/t", "/s"], "a.py", ["--step-on"]),
         (["--step-on", "none", "--seed", "3", "a.py"], ["none"], "a.py", []),
         (["--record", "run.bag", "--step-on", "/t", "a.py", "x"], ["/t"], "a.py", ["x"]),
         (["--step-on", "/t", "--step-on", "/s", "--dt", "0.002", "a.py"], ["/t", "/s"], "a.py", []),
@@ -52,18 +47,13 @@ def test_seeds_reach_every_generator(monkeypatch):
     import random
     import secrets
 
-    import gymnasium
     import numpy
     import torch
+    from gymnasium.utils.seeding import np_random
 
     def drawn():
-        return (
-            random.random(),
-            numpy.random.random(),
-            numpy.random.default_rng().random(),
-            gymnasium.utils.seeding.np_random()[0].random(),
-            torch.rand(1).item(),
-        )
+        generators = (random, numpy.random, numpy.random.default_rng(), np_random()[0])
+        return [*(each.random() for each in generators), torch.rand(1).item()]
 
     monkeypatch.setattr(numpy.random.bit_generator, "randbits", secrets.randbits)
     states = random.getstate(), numpy.random.get_state(), torch.get_rng_state()
@@ -81,8 +71,6 @@ def test_seeds_reach_every_generator(monkeypatch):
 
 
 def test_what_is_imported_later_is_seen_to_once(tmp_path, monkeypatch):
-    import sys
-
     (tmp_path / "imported_later.py").write_text("value = 1\n")
     monkeypatch.syspath_prepend(tmp_path)
     seen = []
@@ -115,9 +103,6 @@ def test_what_simulates_threads_and_processes_is_loaded_for_scripts_that_use_the
         f"{line}\nimport sys\n"
         "print(*[name for name in sys.modules if name.startswith('lockstep_runner.concurrency.')])\n"
     )
-    done = subprocess.run(
-        [sys.executable, root / "scripts/lockstep.py", script],
-        env=os.environ | {"ROS_MASTER_URI": "http://127.0.0.1:1"},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+    environment = os.environ | {"ROS_MASTER_URI": "http://127.0.0.1:1"}
+    done = run([sys.executable, root / "scripts/lockstep.py", script], check=True, env=environment)
     assert {name.rpartition(".")[2] for name in done.stdout.split()} == loaded

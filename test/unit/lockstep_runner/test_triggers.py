@@ -1,5 +1,7 @@
 """When time passes for scripts that don't wait by themselves."""
 
+import pytest
+
 from lockstep_runner.triggers import Triggers
 
 
@@ -31,15 +33,11 @@ class Script:
         return self.periods
 
 
-def test_one_topic_lets_a_period_pass_with_each_message_from_the_second_on():
+@pytest.mark.parametrize("topics", [["/a"], ["/a", "/b", "/c"]])
+def test_a_round_of_topics_lets_a_period_pass_from_the_second_one_on(topics):
     script = Script()
     # The first one's is made up for
-    assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]
-
-
-def test_several_joints_are_one_round():
-    script = Script()
-    assert [script.publish("/a", "/b", "/c") for _ in range(4)] == [0, 2, 3, 4]
+    assert [script.publish(*topics) for _ in range(4)] == [0, 2, 3, 4]
 
 
 def test_the_period_passes_behind_the_last_of_a_round():
@@ -50,19 +48,12 @@ def test_the_period_passes_behind_the_last_of_a_round():
     assert script.publish("/b") == before + 1
 
 
-def test_a_script_that_waits_by_itself_gets_none():
+def test_a_script_that_waits_by_itself_gets_none_until_it_waits_no_longer():
     script = Script()
     for _ in range(5):
         script.publish("/a")
         script.triggers.waited()
     assert script.periods == 0
-
-
-def test_a_script_that_waits_no_longer_gets_them():
-    script = Script()
-    for _ in range(5):
-        script.publish("/a")
-        script.triggers.waited()
     assert [script.publish("/a") for _ in range(4)] == [0, 2, 3, 4]
 
 

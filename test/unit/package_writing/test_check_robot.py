@@ -34,15 +34,16 @@ def check(tmp_path, capfd, monkeypatch):
 
 
 def limited(limit: str) -> str:
-    return robot(
-        FIXED, BASE, ROD, JOINT.format("swing", "revolute", "base", "rod", f"<limit {limit}/>")
-    )
+    swing = JOINT.format("swing", "revolute", "base", "rod", f"<limit {limit}/>")
+    return robot(FIXED, BASE, ROD, swing)
+
+
+WEAK = limited('lower="-1" upper="1" effort="0" velocity="2"')
+SOUND = robot(FIXED, BASE, ROD, SWING, MOTOR.format("swing", "Effort"), PLUGIN)
 
 
 def test_a_sound_robot_is_fine_on_one_page(check):
-    code, page, refused = check(
-        text=robot(FIXED, BASE, ROD, SWING, MOTOR.format("swing", "Effort"), PLUGIN)
-    )
+    code, page, refused = check(text=SOUND)
     assert (code, refused) == (0, "")
     rows = dict(line.split(None, 1) for line in page.splitlines()[1:] if line)
     assert rows["model"] == "theirs: base fixed to the world"
@@ -58,7 +59,7 @@ def test_a_sound_robot_is_fine_on_one_page(check):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        (limited('lower="-1" upper="1" effort="0" velocity="2"'), "the effort of its <limit> is 0"),
+        (WEAK, "the effort of its <limit> is 0"),
         (limited('lower="-1" upper="1" effort="9" velocity="0"'), "the velocity of its <limit> is 0"),
         (limited('effort="9" velocity="2"'), "the range of its <limit> is 0"),
         (
@@ -83,8 +84,7 @@ def test_faults_of_robots_are_named(check, text, fault):
 
 
 def test_position_commands_move_joints_without_a_known_effort(check):
-    text = limited('lower="-1" upper="1" effort="0" velocity="2"')
-    text = text.replace("</robot>", MOTOR.format("swing", "Position") + "</robot>")
+    text = WEAK.replace("</robot>", MOTOR.format("swing", "Position") + "</robot>")
     assert check(text=text)[0] == 0
 
 
@@ -110,16 +110,15 @@ def test_controllers_are_served_or_named(check, tmp_path):
         "odd: {type: effort_controllers/JointEffortControler, joint: swing}\n"
         "lost: {type: effort_controllers/JointEffortController, joint: swong}\n"
     )
-    text = robot(FIXED, BASE, ROD, SWING, MOTOR.format("swing", "Effort"), PLUGIN)
-    code, page, _ = check("--controllers", tmp_path / "c.yaml", text=text)
+    code, page, _ = check("--controllers", tmp_path / "c.yaml", text=SOUND)
     assert code == 1
     assert "1 of 3 served: good (effort_controllers/JointEffortController)" in page
     assert "did you mean 'effort_controllers/JointEffortController'?" in page
     assert "there is no joint 'swong'; did you mean 'swing'?" in page
     (tmp_path / "other.yaml").write_text("bot: {good: {type: x/Y}}")
-    code, page, _ = check("--controllers", tmp_path / "other.yaml", text=text)
+    code, page, _ = check("--controllers", tmp_path / "other.yaml", text=SOUND)
     assert code == 1 and "other.yaml has no controller outside of namespaces" in page
-    code, page, refused = check("--controllers", tmp_path / "none.yaml", text=text)
+    code, page, refused = check("--controllers", tmp_path / "none.yaml", text=SOUND)
     assert (code, page) == (2, "") and "none.yaml" in refused and refused.count("\n") == 1
 
 
@@ -149,7 +148,7 @@ def test_what_is_not_there_is_one_line(check, given):
 
 def test_several_files_have_a_page_each_and_the_worst_code(check, tmp_path):
     (tmp_path / "a.urdf").write_text(robot(GROUNDED))
-    (tmp_path / "b.urdf").write_text(limited('lower="-1" upper="1" effort="0" velocity="2"'))
+    (tmp_path / "b.urdf").write_text(WEAK)
     code, page, _ = check(tmp_path / "a.urdf", tmp_path / "b.urdf")
     assert (code, page.count("verdict")) == (1, 2)
     code, page, refused = check(tmp_path / "b.urdf", tmp_path / "none.urdf", tmp_path / "a.urdf")
@@ -164,12 +163,9 @@ def test_a_package_is_found_by_its_checkout_and_its_parts_are_no_robots(check, t
     (package / "package.xml").write_text("<package><name>their_robot</name></package>")
     (package / "urdf/parts.xacro").write_text(robot('<xacro:macro name="part" params="mass"/>'))
     (package / "urdf/needs.xacro").write_text(robot('<link name="${given_by_another_file}"/>'))
+    argument = '<xacro:arg name="link" default="base"/>'
     include = '<xacro:include filename="$(find their_robot)/urdf/parts.xacro"/>'
-    arm = robot(
-        '<xacro:arg name="link" default="base"/>',
-        include,
-        GROUNDED.replace('"base"', '"$(arg link)"'),
-    )
+    arm = robot(argument, include, GROUNDED.replace('"base"', '"$(arg link)"'))
     (package / "urdf/arm.urdf.xacro").write_text(arm)
     code, page, refused = check(package, "link:=foot")
     assert (code, page.count("verdict")) == (0, 1)

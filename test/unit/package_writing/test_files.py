@@ -60,19 +60,27 @@ def test_meshes_by_a_plain_path_come_along(new, tmp_path):
     assert made.links.links["rod"].collisions[0].mesh == str(folder / "meshes/rod.stl")
 
 
+KINDS = ("visual", "collision")
+
+
+def rod(package: Path, start: str = "package://") -> str:
+    """A link with meshes of one name, which it writes to folders of a package."""
+    shapes = ""
+    for kind in KINDS:
+        folder = package / "meshes" / kind
+        folder.mkdir(parents=True)
+        (folder / "rod.stl").write_bytes(binary_stl(len(kind)))
+        mesh = f'<mesh filename="{start}{package.name}/meshes/{kind}/rod.stl"/>'
+        shapes += f"<{kind}><geometry>{mesh}</geometry></{kind}>"
+    return LINK.format("rod", shapes)
+
+
 def test_meshes_of_a_package_that_was_downloaded_without_its_package_xml_come_along(new, tmp_path):
-    for kind in ("visual", "collision"):  # of one name
-        (tmp_path / "arm_files/meshes" / kind).mkdir(parents=True)
-        (tmp_path / "arm_files/meshes" / kind / "rod.stl").write_bytes(binary_stl(len(kind)))
-    shapes = "".join(
-        f'<{kind}><geometry><mesh filename="package://arm_files/meshes/{kind}/rod.stl"/></geometry></{kind}>'
-        for kind in ("visual", "collision")
-    )
-    (tmp_path / "arm_files/urdf").mkdir()
     urdf = tmp_path / "arm_files/urdf/arm.urdf"
-    urdf.write_text(robot(BARE[0], LINK.format("rod", shapes), SWING, FIXED))
+    urdf.parent.mkdir(parents=True)
+    urdf.write_text(robot(BARE[0], rod(tmp_path / "arm_files"), SWING, FIXED))
     folder, made, *_ = new("my_download", urdf)
-    for kind in ("visual", "collision"):
+    for kind in KINDS:
         copy = folder / "meshes/arm_files" / kind / "rod.stl"
         assert copy.read_bytes() == binary_stl(len(kind))
     assert made.links.links["rod"].collisions[0].mesh == str(copy)
@@ -86,14 +94,7 @@ def described(tmp_path, monkeypatch):
     (other / "package.xml").write_text(
         "<package><name>their_description</name><export><build_type>ament_cmake</build_type></export></package>"
     )
-    shapes = ""
-    for kind in ("visual", "collision"):  # of one name
-        (other / "meshes" / kind).mkdir(parents=True)
-        (other / "meshes" / kind / "rod.stl").write_bytes(binary_stl(len(kind)))
-        place = f"$(arg from)their_description/meshes/{kind}/rod.stl"
-        shapes += f'<{kind}><geometry><mesh filename="{place}"/></geometry></{kind}>'
-    links = LINK.format("base", "") + LINK.format("rod", shapes)
-    (other / "urdf/links.xacro").write_text(robot(links))
+    (other / "urdf/links.xacro").write_text(robot(BARE[0], rod(other, "$(arg from)")))
     urdf = other / "urdf/arm.urdf.xacro"
     urdf.write_text(
         robot(
@@ -147,7 +148,7 @@ def test_meshes_of_one_name_stay_apart(tmp_path):
     copied = copy_urdf(urdf, {}, "mine", tmp_path / "mine", standalone=True)
     places = re.findall('filename="package://mine/(.*?)"', copied.xml)
     assert places == [
-        *("meshes/base.stl", "meshes/cup.obj", "meshes/2/base.stl", "meshes/2/cup.obj")
+        f"meshes/{name}" for name in ("base.stl", "cup.obj", "2/base.stl", "2/cup.obj")
     ]
     for size, place, owner in ((1, "meshes", "arm"), (2, "meshes/2", "gripper")):
         folder = tmp_path / "mine" / place

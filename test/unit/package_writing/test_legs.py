@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.pages.code_blocks import blocks
 from support.robots.new_robots import FIXED
 
 from package_writing.standing import centre_of_mass, feet
@@ -52,9 +53,7 @@ def test_a_quadruped_crouches_where_it_is_told_and_stays_there(new, mass):
     """The body's weight is on the legs: gains for the legs alone let it sink to a third of its height."""
     text = QUADRUPED.read_text().replace('mass value="10"', f'mass value="{mass}"')
     _, made, _, told = new("my_dog", text.replace('effort="40"', 'effort="150"'), "--base", "free")
-    on = ", ".join(
-        f"{leg}_calf" for leg in ("front_left", "front_right", "rear_left", "rear_right")
-    )
+    on = "front_left_calf, front_right_calf, rear_left_calf, rear_right_calf"
     assert f"stands on its feet: {on}" in told
     for angle in (0.4, 1.1):
         found = heights(made, angle, 4.0)
@@ -67,9 +66,8 @@ def test_a_quadruped_crouches_where_it_is_told_and_stays_there(new, mass):
 def test_what_stands_on_wheels_or_its_base_or_is_fixed_has_no_feet():
     text = QUADRUPED.read_text()
     assert len(feet(parse_urdf(text))) == 4
-    fixed = text.replace(
-        '<link name="trunk">', f'{FIXED.replace("base", "trunk")}<link name="trunk">'
-    )
+    trunk = '<link name="trunk">'
+    fixed = text.replace(trunk, FIXED.replace("base", "trunk") + trunk)
     flat = text.replace('size="0.4 0.2 0.1"', 'size="0.4 0.2 0.9"')
     for other in (fixed, flat, text.replace("revolute", "continuous")):
         assert feet(parse_urdf(other)) == []
@@ -77,14 +75,11 @@ def test_what_stands_on_wheels_or_its_base_or_is_fixed_has_no_feet():
 
 def knees(lower, upper):
     """The quadruped, its knees with other stops [rad]."""
-    legs = QUADRUPED.read_text().split("<joint ")
-    changed = [
-        re.sub('lower="[^"]*" upper="[^"]*"', f'lower="{lower}" upper="{upper}"', leg)
-        if "_knee" in leg.split(">")[0]
-        else leg
-        for leg in legs
-    ]
-    return "<joint ".join(changed)
+    knee = r'(<joint name="\w+_knee".*?)lower="[^"]*" upper="[^"]*"'
+    changed = rf'\g<1>lower="{lower}" upper="{upper}"'
+    text, count = re.subn(knee, changed, QUADRUPED.read_text(), flags=re.DOTALL)
+    assert count == 4
+    return text
 
 
 def test_a_quadruped_stands_whose_knees_cannot_be_straight(new):
@@ -111,12 +106,10 @@ def test_a_quadruped_stands_whose_knees_cannot_be_straight(new):
 def test_the_walker_of_the_tutorial(new):
     """Its base is placed, rewarded by its speed, and may not fall."""
     folder, made, *_ = new("my_dog", knees(-2.7, -0.9), "--base", "free")
-    page = Path(__file__).resolve().parents[3] / "docs/tutorial_robot.md"
-    (walker,) = re.findall(
-        r"^```python skip\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL
-    )
+    page = blocks(Path(__file__).resolve().parents[3] / "docs/tutorial_robot.md")
+    (walker,) = (each for each in page if (each.language, each.mark) == ("python", "skip"))
     with (folder / "src/my_dog/tasks.py").open("a") as file:
-        file.write(f"\n\n{walker}")
+        file.write(f"\n\n{walker.text}")
     sys.modules.pop("my_dog.tasks")
     env = RobotEnv(made, importlib.import_module("my_dog.tasks").Walk())
     try:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import pytest
 import yaml
+from support.python import run
 from support.robots.new_robots import BARE, FIXED, JOINT, LINK, MOTOR, PLUGIN, SWING, reaches, robot
 
 from package_writing import package
@@ -76,25 +76,21 @@ def test_what_is_written_is_tidy(new):
     ruff = [sys.executable, "-m", "ruff"]
     options = ["--isolated", "--no-cache", "--line-length", "100"]
     for command in (["check", "--extend-select", "I,W,B,SIM,UP"], ["format", "--diff"]):
-        done = subprocess.run(
-            [*ruff, *command, *options], cwd=folder, capture_output=True, text=True, check=False
-        )
+        done = run([*ruff, *command, *options], cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("interface", ["effort", "position", "velocity"])
 def test_transmissions_plugin_and_base_that_lack_are_added_beside(new, interface):
-    folder, made, task, told = new(
-        f"my_{interface}", robot(*BARE), "--base", "fixed", "--interface", interface
-    )
+    words = ("--base", "fixed", "--interface", interface)
+    folder, made, task, told = new(f"my_{interface}", robot(*BARE), *words)
     added = f"urdf/my_{interface}_control.urdf.xacro"
     assert added in told and (folder / added).is_file()
     assert (folder / "urdf/robot.urdf").read_text() == robot(*BARE)
     assert made.links.fixed_base and made.links.plugins
-    assert [each.interface for each in made.control.transmissions] == [
-        f"{interface.capitalize()}JointInterface"
-    ]
+    (transmission,) = made.control.transmissions
+    assert transmission.interface == f"{interface.capitalize()}JointInterface"
     assert reaches(made, task)
 
 
@@ -114,12 +110,8 @@ def test_a_robot_whose_base_is_free(new):
 
 
 def test_a_namespace_of_the_plugin(new):
-    text = robot(
-        *BARE,
-        FIXED,
-        MOTOR.format("swing", "Effort"),
-        PLUGIN.format("<robotNamespace>/one</robotNamespace>"),
-    )
+    plugin = PLUGIN.format("<robotNamespace>/one</robotNamespace>")
+    text = robot(*BARE, FIXED, MOTOR.format("swing", "Effort"), plugin)
     folder, made, task, _ = new("my_named", text)
     assert made.namespace == "one"
     assert 'ns="/one"' in (folder / "launch/simulation.launch").read_text()
@@ -127,9 +119,8 @@ def test_a_namespace_of_the_plugin(new):
 
 
 def test_limits_of_0_which_exporters_write_are_lifted_and_told(new):
-    zero = JOINT.format(
-        "swing", "revolute", "base", "rod", '<limit lower="-1" upper="1" effort="0" velocity="0"/>'
-    )
+    limit = '<limit lower="-1" upper="1" effort="0" velocity="0"/>'
+    zero = JOINT.format("swing", "revolute", "base", "rod", limit)
     _, made, task, told = new("my_export", robot(*BARE[:2], zero, FIXED))
     assert "limits of effort and velocity that are 0 would hold swing" in told
     assert reaches(made, task)
@@ -184,17 +175,10 @@ def test_its_test_holds_for_a_task_that_takes_the_place_of_reach_in_a_clone(new,
     (tmp_path / "parts/rod.xacro").write_text(robot(LINK.format("rod", seen)))
     parts = robot(BARE[0], FIXED, SWING, '<xacro:include filename="parts/../parts/rod.xacro"/>')
     folder, *_ = new("my_other", parts)
-    (folder / "src/my_other/tasks.py").write_text(
-        (folder / "src/my_other/tasks.py")
-        .read_text()
-        .replace("RANGES", "SPANS")
-        .replace("Reach", "Hold")
-    )
-    named = (
-        *("src/my_other/environment.py", "launch/train.launch"),
-        *("test/test_environment.py", "test/simulation_node.py"),
-    )
-    for place in named:
+    tasks = folder / "src/my_other/tasks.py"
+    tasks.write_text(tasks.read_text().replace("RANGES", "SPANS").replace("Reach", "Hold"))
+    for place in ("src/my_other/environment.py", "launch/train.launch", "test/test_environment.py",
+                  "test/simulation_node.py"):  # fmt: skip
         text = (folder / place).read_text()
         assert "Reach" in text
         (folder / place).write_text(text.replace("Reach", "Hold"))
@@ -204,13 +188,11 @@ def test_its_test_holds_for_a_task_that_takes_the_place_of_reach_in_a_clone(new,
         ["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "-qm", "all"],
         ["clone", "-q", folder, clone],
     ):  # fmt: skip
-        subprocess.run(["git", *command], cwd=folder, check=True)
+        run(["git", *command], cwd=folder, check=True)
     folder.rename(tmp_path / "gone")
     assert os.access(clone / "test/simulation_node.py", os.X_OK)
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", clone / "test"],
-        cwd=clone, capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": f"{clone}/src:{os.environ.get('PYTHONPATH', '')}",
-             "ROS_PACKAGE_PATH": f"{clone}:{os.environ['ROS_PACKAGE_PATH']}"},
-    )  # fmt: skip
+    own = {"PYTHONPATH": f"{clone}/src:{os.environ.get('PYTHONPATH', '')}",
+           "ROS_PACKAGE_PATH": f"{clone}:{os.environ['ROS_PACKAGE_PATH']}"}  # fmt: skip
+    words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", clone / "test")
+    done = run([sys.executable, *words], cwd=clone, env={**os.environ, **own})
     assert done.returncode == 0, done.stdout + done.stderr

@@ -33,47 +33,26 @@ MAST = "".join((LINK.format("mast", ""), JOINT.format("diff_drive", "revolute", 
         (robot(*BARE, "<xacro:include filename='none.xacro'/>"), [], "none.xacro"),
         (robot(*BARE, FIXED, MOTOR.format("swung", "Effort")), [], "transmission of joint 'swung'"),
         (robot(*BARE, FIXED, MOTOR.format("swing", "Hydraulic")), [], "HydraulicJointInterface"),
-        (
-            robot(*BARE[:2], FIXED, SWING.replace('lower="-1" upper="2" ', "")),
-            [],
-            "joint 'swing' can't move: lower and upper",
-        ),
-        (
-            robot(BARE[0], SWING, FIXED, LINK.format("rod", NOBODYS)),
-            [],
-            "the package 'nobodys', which isn't found: ./ws --with FOLDER",
-        ),
-        (
-            robot(*BARE, FIXED, LINK.format("end", ""), JOINT.format("a b", "revolute", "rod", "end", LIMIT))
-            .replace("swing", "a_b"),
-            [],
-            "would share the controller a_b_controller",
-        ),
-        (
-            robot(*BARE, FIXED).replace("swing", "joint_state"),
-            [],
-            'the controller of the joint "joint_state" would be called joint_state_controller',
-        ),
-        (
-            two_wheels().replace("</robot>", MAST),
-            ["--base", "free"],
-            "the joint \"diff_drive\" would be called diff_drive_controller, as another one is",
-        ),
+        (robot(*BARE[:2], FIXED, SWING.replace('lower="-1" upper="2" ', "")), [],
+         "joint 'swing' can't move: lower and upper"),
+        (robot(BARE[0], SWING, FIXED, LINK.format("rod", NOBODYS)), [],
+         "the package 'nobodys', which isn't found: ./ws --with FOLDER"),
+        (robot(*BARE, FIXED, LINK.format("end", ""), JOINT.format("a b", "revolute", "rod", "end", LIMIT))
+         .replace("swing", "a_b"), [], "would share the controller a_b_controller"),
+        (robot(*BARE, FIXED).replace("swing", "joint_state"), [],
+         'the controller of the joint "joint_state" would be called joint_state_controller'),
+        (two_wheels().replace("</robot>", MAST), ["--base", "free"],
+         'the joint "diff_drive" would be called diff_drive_controller, as another one is'),
         (robot(*BARE, FIXED, PLUGIN.format("<robotNamespace>a b</robotNamespace>")), [], "'a b'"),
         (robot(*BARE, FIXED).replace('value="0.5"', 'value="1e30"'), [], "can't take a step"),
         (robot(*BARE, FIXED).replace("swing", "sw\x7fing"), [], r"rename the joint 'sw\x7fing'"),
-        (
-            robot(*BARE, FIXED).replace('lower="-1" upper="2"', 'lower="0" upper="1e308"'),
-            [],
-            "'swing' can't move from 0 to 1e+308",
-        ),
+        (robot(*BARE, FIXED).replace('lower="-1" upper="2"', 'lower="0" upper="1e308"'), [],
+         "'swing' can't move from 0 to 1e+308"),
         (robot(*BARE, FIXED), ["size=3"], "NAME:=VALUE"),
         (robot(*BARE, FIXED), ["--height", "nan"], "--height"),
         (robot(*BARE, FIXED), ["--passive", "swign"], "did you mean 'swing'?"),
-        (
-            robot(*BARE, FIXED, MOTOR.format("swing", "Effort")), ["--passive", "swing"],
-            "for files without transmissions",
-        ),
+        (robot(*BARE, FIXED, MOTOR.format("swing", "Effort")), ["--passive", "swing"],
+         "for files without transmissions"),
     ],
 )  # fmt: skip
 def test_a_robot_that_can_not_be_used_is_one_line(tmp_path, capsys, text, arguments, words):
@@ -111,9 +90,8 @@ def test_a_name_that_is_taken_is_refused(tmp_path, capsys, name):
 @pytest.mark.parametrize("there", ["folder", "file", "link"])
 def test_nothing_is_overwritten(tmp_path, capsys, there):
     place = tmp_path / "my_arm"
-    {"folder": place.mkdir, "file": place.touch, "link": lambda: place.symlink_to("nowhere")}[
-        there
-    ]()
+    link = lambda: place.symlink_to("nowhere")  # noqa: E731
+    {"folder": place.mkdir, "file": place.touch, "link": link}[there]()
     assert main(["my_arm", "--to", str(tmp_path)]) == 1
     assert "is there already" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["my_arm"]

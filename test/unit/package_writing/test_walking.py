@@ -45,41 +45,31 @@ def test_a_quadruped_trots_by_commands(new):
 
 
 def test_what_has_no_legs_is_refused(tmp_path, capsys):
-    code = main(
-        ["my_wheels", "--urdf", ARM, "--base", "fixed", "--task", "walk", "--to", str(tmp_path)]
-    )
-    assert code == 1 and "--task walk: it has no legs" in capsys.readouterr().err
+    words = ["--urdf", ARM, "--base", "fixed", "--task", "walk", "--to", str(tmp_path)]
+    assert main(["my_wheels", *words]) == 1
+    assert "--task walk: it has no legs" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    "places, phases",
+    "legs",
     [
-        ({"left": (0, 1), "right": (0, -1)}, {"left": 0.0, "right": 0.5}),
-        (
-            {
-                "l1": (2, 1),
-                "l2": (0, 1),
-                "l3": (-2, 1),
-                "r1": (2, -1),
-                "r2": (0, -1),
-                "r3": (-2, -1),
-            },
-            {"l1": 0.0, "l2": 0.5, "l3": 0.0, "r1": 0.5, "r2": 0.0, "r3": 0.5},
-        ),
+        {"left": (0, 1, 0.0), "right": (0, -1, 0.5)},
+        {"l1": (2, 1, 0.0), "l2": (0, 1, 0.5), "l3": (-2, 1, 0.0),
+         "r1": (2, -1, 0.5), "r2": (0, -1, 0.0), "r3": (-2, -1, 0.5)},
     ],
     ids=["two step in turn", "six walk on three"],
-)
-def test_the_gait_of_legs_is_by_where_they_stand(places, phases):
+)  # fmt: skip
+def test_the_gait_of_legs_is_by_where_they_stand(legs):
     mass = """<inertial><mass value="1"/>
         <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>"""
-    legs = "".join(
+    parts = "".join(
         f'''<link name="{name}">{mass}</link><joint name="{name}_joint" type="revolute"><parent link="trunk"/>
         <child link="{name}"/><origin xyz="{x} {y} 0"/><axis xyz="0 1 0"/>
         <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'''
-        for name, (x, y) in places.items()
+        for name, (x, y, _) in legs.items()
     )
-    model = parse_urdf(f'<robot name="r"><link name="trunk">{mass}</link>{legs}</robot>')
-    assert gait(model, list(places)) == phases
+    model = parse_urdf(f'<robot name="r"><link name="trunk">{mass}</link>{parts}</robot>')
+    assert gait(model, list(legs)) == {name: phase for name, (_, _, phase) in legs.items()}
 
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -106,17 +96,15 @@ WALKERS = {  # joints and mass [kg]
 )
 def test_it_stands_at_first_launch_and_under_a_push(new, tmp_path, file, arguments):
     """For 10 s, on both engines, with 10 % of the weight for 0.1 s ahead and aside."""
-    (folder, robot, *_) = new(
-        "my_legs", ROOT / f"urdf/{file}.urdf.xacro", *arguments, "--base", "free"
-    )
+    urdf = ROOT / f"urdf/{file}.urdf.xacro"
+    folder, robot, *_ = new("my_legs", urdf, *arguments, "--base", "free")
     stance = importlib.import_module("my_legs.robot").STANCE
     mass = sum(each.inertia.mass for each in robot.links.links.values() if each.inertia)
     assert (len(robot.joints), round(mass, 1)) == WALKERS[file, *arguments]
     force, root = 0.1 * 9.81 * mass, robot.links.root
     for engine in ("bullet", "mujoco")[: 2 if importlib.util.find_spec("mujoco") else 1]:
-        world = make_backend(
-            Scene([dataclasses.replace(robot, engine=engine)]), None, robot.control_period
-        )
+        scene = Scene([dataclasses.replace(robot, engine=engine)])
+        world = make_backend(scene, None, robot.control_period)
         world.look(StateQuery(links=(LinkQuery(root),)))
         start = world.reset(InitialState(joints=stance)).links[root].pose.position[2]
         heights = []

@@ -78,18 +78,16 @@ def drives(made, task, seed: int = 1) -> tuple[bool, np.ndarray]:
 
 
 def test_two_wheels_of_a_free_base_get_a_diff_drive_controller_and_drive_to_goals(new):
-    folder, made, task, told = new(
-        "my_wheels", robot(*ROVER), "--base", "free", "--passive", "swivel"
-    )
+    words = ("--base", "free", "--passive", "swivel")
+    folder, made, task, told = new("my_wheels", robot(*ROVER), *words)
     assert controllers_of(folder) == {"pan": "effort_controllers/JointPositionController"}
     drive = yaml.safe_load((folder / "config/controllers.yaml").read_text())[DRIVE]
     assert (drive["left_wheel"], drive["right_wheel"]) == (["left_wheel"], ["right_wheel"])
     assert (drive["wheel_radius"], drive["wheel_separation"]) == (0.1, 0.3)
     assert drive["base_frame_id"] == "base"
     assert drive["linear"]["x"]["max_velocity"] == 0.6  # 20 rad/s would be 2 m/s
-    assert f"joint_state_controller {DRIVE} pan_controller" in (
-        (folder / "launch/simulation.launch").read_text()
-    )
+    launch = (folder / "launch/simulation.launch").read_text()
+    assert f"joint_state_controller {DRIVE} pan_controller" in launch
     assert "left_wheel on the left and right_wheel on the right get a diff_drive" in told
     assert "--algo sac --env-id my_wheels.environment:my_wheels/Drive-v0" in told
     assert "without a motor, and that tasks don't see: swivel" in told
@@ -122,10 +120,8 @@ def test_wheels_on_each_side_drive_as_one_and_other_wheels_alone():
     )  # fmt: skip
     assert base.world == "" and base.laser is None
     assert base_of(three_wheels()) is None  # one of them on a fork
-    unicycle = two_wheels().replace(f'"0 {0.5 * TRACK} 0"', '"0 0 0"')
-    assert (
-        base_of(unicycle.replace(f'"0 {-0.5 * TRACK} 0"', '"0.2 0 0"')) is None
-    )  # one behind the other
+    behind = two_wheels().replace(f'"0 {0.5 * TRACK} 0"', '"0 0 0"')
+    assert base_of(behind.replace(f'"0 {-0.5 * TRACK} 0"', '"0.2 0 0"')) is None
     front = wheel("front", "0.2 0 0")
     assert base_of(two_wheels().replace("</robot>", f"{front}</robot>")) is None  # an odd one
     assert base_of(two_wheels().replace('axis xyz="0 1 0"', 'axis xyz="1 0 0"')) is None
@@ -141,13 +137,13 @@ def test_a_laser_that_sees_its_own_robot_is_left_out_and_told():
 @pytest.mark.slow
 def test_wheels_that_turn_the_other_way_get_a_velocity_each(new):
     mirrored = [each.replace("0 1 0", "0 -1 0") for each in ROVER]
-    folder, made, task, told = new(
-        "my_mirror", robot(*mirrored), "--base", "free", "--passive", "swivel"
+    words = ("--base", "free", "--passive", "swivel")
+    folder, made, task, told = new("my_mirror", robot(*mirrored), *words)
+    wheels = dict.fromkeys(
+        ["left_wheel", "right_wheel"], "velocity_controllers/JointVelocityController"
     )
-    kind = "velocity_controllers/JointVelocityController"
-    assert controllers_of(folder) == {
-        "left_wheel": kind, "right_wheel": kind, "pan": "effort_controllers/JointPositionController",
-    }  # fmt: skip
+    pan = {"pan": "effort_controllers/JointPositionController"}
+    assert controllers_of(folder) == wheels | pan
     assert "get a velocity controller, as wheels: left_wheel, right_wheel" in told
     assert reaches(made, task)
 
@@ -163,9 +159,8 @@ def test_wheels_whose_motors_give_an_effort(new):
 
 @pytest.mark.slow
 def test_joints_without_end_keep_positions_where_that_is_asked_for_or_the_base_is_fixed(new):
-    folder, *_ = new(
-        "my_asked", robot(*ROVER), "--base", "free", "--interface", "position", "--height", "0.1"
-    )
+    words = ("--base", "free", "--interface", "position", "--height", "0.1")
+    folder, *_ = new("my_asked", robot(*ROVER), *words)
     assert set(controllers_of(folder).values()) == {"position_controllers/JointPositionController"}
     folder, *_, told = new("my_bench", robot(*ROVER), "--base", "fixed")
     assert set(controllers_of(folder).values()) == {"effort_controllers/JointPositionController"}

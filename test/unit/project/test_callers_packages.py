@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from pathlib import Path
 
 import pytest
+from support import python
 
 pytestmark = pytest.mark.slow
 PACKAGE = """<package format="2"><name>{name}</name><version>9.9.9</version><description>d</description>
@@ -53,22 +53,10 @@ def workspace(tmp_path_factory):
     return workspace
 
 
-def run(command, **options):
-    done = subprocess.run(
-        command,
-        check=False,
-        env={
-            "PATH": "/usr/bin:/bin",
-            "HOME": os.environ["HOME"],
-            "ROS_LANG_DISABLE": "gencpp:genlisp",
-        }
-        | options.pop("env", {}),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        **options,
-    )
+def run(command, cwd=None, **environment):
+    plain = {"PATH": "/usr/bin:/bin", "HOME": os.environ["HOME"]}
+    plain["ROS_LANG_DISABLE"] = "gencpp:genlisp"
+    done = python.run(command, cwd=cwd, env=plain | environment)
     assert done.returncode == 0, f"{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
     return done.stdout
 
@@ -120,8 +108,7 @@ def test_only_on_ros_package_path(root, workspace):
     """Then ws builds what has to be built, in a place of its own; more in test_ws_with.py."""
 
     def ws(*command):
-        environment = {"ROS_PACKAGE_PATH": str(workspace / "src")}
-        return run([root / "ws", *command], env=environment).strip()
+        return run([root / "ws", *command], ROS_PACKAGE_PATH=str(workspace / "src")).strip()
 
     assert ws("rospack", "find", "their_robot") == str(workspace / "src/their_robot")
     assert ws("rospack", "find", "control_msgs") == str(workspace / "src/control_msgs")
@@ -139,5 +126,5 @@ def test_a_whole_ros_is_left_out(root, tmp_path):
         (modules / name / "__init__.py").write_text("raise ImportError('a stranger')")
     (tmp_path / "share/rospy").mkdir(parents=True)
     (tmp_path / ".catkin").touch()
-    environment = {"CMAKE_PREFIX_PATH": str(tmp_path), "PYTHONPATH": str(modules)}
-    run([root / "ws", "python3", "-c", "import rospy, control_msgs.msg"], env=environment)
+    command = [root / "ws", "python3", "-c", "import rospy, control_msgs.msg"]
+    run(command, CMAKE_PREFIX_PATH=str(tmp_path), PYTHONPATH=str(modules))

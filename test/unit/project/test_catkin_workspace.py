@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 import rosgraph
+from support.python import run
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[3]
@@ -44,23 +45,16 @@ class Workspace:
         self.python = self.path / "venv/bin/python3"
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
-        self.environment = (
-            {
-                "PATH": "/usr/bin:/bin",
-                "HOME": str(home),
-                "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-                "ROS_IP": "127.0.0.1",
-                "OMP_NUM_THREADS": "1",
-                "ROS_LANG_DISABLE": "gencpp:genlisp",  # nothing here needs these, and they take most time
-            }
-            | {name: value for name, value in os.environ.items() if name.startswith("PIP_")}
-        )
+        self.environment = {
+            "PATH": "/usr/bin:/bin", "HOME": str(home), "OMP_NUM_THREADS": "1",
+            "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1",
+            "ROS_LANG_DISABLE": "gencpp:genlisp",  # nothing here needs these, and they take most time
+            **{name: value for name, value in os.environ.items() if name.startswith("PIP_")},
+        }  # fmt: skip
 
     def bash(self, script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            ["bash", "-ec", script, "bash", *arguments], check=False, cwd=self.home,
-            env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600,
-        )  # fmt: skip
+        command = ["bash", "-ec", script, "bash", *arguments]
+        return run(command, cwd=self.home, env=self.environment, timeout=600)
 
     def inside(self, *command: str, space: str = "devel") -> subprocess.CompletedProcess[str]:
         # In a function of its own, because catkin's setup file looks at the caller's arguments.

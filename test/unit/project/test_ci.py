@@ -1,10 +1,10 @@
 """What CI runs: failed checks are named and fail the run; failed tests run once more, alone."""
 
 import shutil
-import subprocess
 import sys
 
 import pytest
+from support.python import run
 
 # Two checks, `bad` fails; sourced as ws does it.
 CHECKS = """
@@ -23,34 +23,25 @@ PASSED = "== 7 passed, 2 deselected in 1.50s =="
 FAILED = "== 1 failed, 5 passed, 1 skipped, 1 xfailed, 2 errors in 61.00s (0:01:01) =="
 WS = """#!/usr/bin/env bash
 case $1 in
-check) echo "{check}"; exit {check_code} ;;
+check) echo "{0}"; exit {1} ;;
 test)
     shift
-    [[ $* == *--last-failed* ]] && {{ echo "{again}"; exit {again_code}; }}
-    echo "{test}"; exit {test_code} ;;
+    [[ $* == *--last-failed* ]] && {{ echo "{4}"; exit {5}; }}
+    echo "{2}"; exit {3} ;;
 esac
 """
-
-
-def bash(*command, cwd):
-    return subprocess.run(["bash", *command], cwd=cwd, text=True, capture_output=True, check=False)
 
 
 @pytest.fixture
 def check(root):
     script = CHECKS.format(check=root / "tools/ws_check.sh")
-    return lambda *names: bash("-c", script, "ws", *names, cwd=root)
+    return lambda *names: run(["bash", "-c", script, "ws", *names], cwd=root)
 
 
 def test_all_checks_run_and_those_that_failed_are_named(check):
     done = check()
-    assert done.stdout.splitlines() == [
-        "== bad: the bad one",
-        "wrong",
-        "== good: the good one",
-        "right",
-        "ws check: failed: bad",
-    ]
+    good, bad = ["== good: the good one", "right"], ["== bad: the bad one", "wrong"]
+    assert done.stdout.splitlines() == [*bad, *good, "ws check: failed: bad"]
     assert done.returncode == 1
 
 
@@ -60,35 +51,20 @@ def test_one_check_alone(check):
     assert (done.returncode, "wrong" in done.stdout) == (0, False)
 
 
-def test_an_unknown_check_is_a_usage_error(check):
-    done = check("good", "nonsense")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "usage: there is no check 'nonsense', only bad good\n"
-
-
 @pytest.fixture
 def ci(root, tmp_path):
     """Runs .ci/run with a fake ws; returns the exit code and the lines of the output."""
     (tmp_path / ".ci").mkdir()
     shutil.copy(root / ".ci/run", tmp_path / ".ci")
 
-    def run(check, check_code, test, test_code, again="", again_code=5):
+    def ended(check, check_code, test, test_code, again="", again_code=5):
         script = tmp_path / "ws"
-        script.write_text(
-            WS.format(
-                check=check,
-                check_code=check_code,
-                test=test,
-                test_code=test_code,
-                again=again,
-                again_code=again_code,
-            )  # fmt: skip
-        )
+        script.write_text(WS.format(check, check_code, test, test_code, again, again_code))
         script.chmod(0o755)
-        done = bash(".ci/run", cwd=tmp_path)
+        done = run([".ci/run"], cwd=tmp_path)
         return done.returncode, done.stdout.splitlines()
 
-    return run
+    return ended
 
 
 @pytest.mark.parametrize(
@@ -164,7 +140,7 @@ def test_the_second_run_is_alone_and_of_what_failed(root, tmp_path):
         f'exec {sys.executable} -m pytest -p no:randomly -c /dev/null --rootdir . "$@" test\n'
     )
     script.chmod(0o755)
-    done = bash(".ci/run", cwd=tmp_path)
+    done = run([".ci/run"], cwd=tmp_path)
     assert done.stdout.splitlines()[-2:] == [
         "flaky: test/test_it.py::test_dies_once, test/test_it.py::test_fails_once",
         "3 passed, 1 failed",

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import os
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +24,7 @@ import yaml
 from bullet_gazebo_msgs.srv import RestoreStateRequest, SaveStateRequest, StepWorldRequest
 from gazebo_msgs.srv import GetWorldPropertiesRequest
 from std_srvs.srv import EmptyRequest
+from support.python import run
 
 from bullet_gazebo.clients import gzclient
 from bullet_gazebo.journal import journal_output
@@ -53,6 +52,10 @@ RUN_BY_TESTS = (
     )),
 )  # fmt: skip
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
+PARSED = {
+    "new_robot.py": new_robot.main, "check_robot.py": check_robot.main,
+    "lockstep.py": lockstep_launcher.main, "replay.py": replay_command.main,
+}  # fmt: skip
 THEIR_ENVIRONMENT = """
 import gymnasium
 gymnasium.register("MyEnv-v0", "gymnasium.envs.classic_control:CartPoleEnv", max_episode_steps=50)
@@ -126,12 +129,9 @@ GROUPS = {
     "scripts": of("python3"),
     "launches": of("roslaunch"),
     "requests": of("rosservice call"),
-    "packages": of("rosrun cartpole new_robot.py"),
-    "checks of robots": of("rosrun cartpole check_robot.py"),
+    "programs": of(*(f"rosrun cartpole {name}" for name in PARSED)),
     "tests": of("test", "rostest", "check", "shell", "tensorboard"),
     "window": of("rosrun gazebo_ros gzclient"),
-    "lockstep": of("rosrun cartpole lockstep.py"),
-    "replays": of("rosrun cartpole replay.py"),
     "bags": of("rosbag record"),
     "clusters": of("ray"),
     "gains": of("rosrun dynamic_reconfigure dynparam set"),
@@ -141,12 +141,8 @@ GROUPS = {
 def test_every_command_is_looked_at() -> None:
     assert ALL
     known = {(command.page, command.words) for group in GROUPS.values() for command in group}
-    strange = [
-        str(each)
-        for each in ALL
-        if (each.page, each.words[each.words[0] == "extras" :]) not in known
-    ]
-    assert strange == []
+    seen = {each: (each.page, each.words[each.words[0] == "extras" :]) for each in ALL}
+    assert [str(each) for each, command in seen.items() if command not in known] == []
 
 
 @pytest.mark.slow
@@ -168,34 +164,22 @@ def test_a_training_runs(command: Command, tmp_path: Path, monkeypatch, capsys) 
     assert TRAININGS[program](flags) == 0, capsys.readouterr()
 
 
-@pytest.mark.parametrize("command", GROUPS["packages"] + GROUPS["checks of robots"], ids=str)
-def test_commands_on_robots_are_taken(command: Command, only_parsing: None, monkeypatch) -> None:
-    monkeypatch.setattr(
-        argparse.ArgumentParser, "parse_intermixed_args", argparse.ArgumentParser.parse_args
-    )
-    main = new_robot.main if command.words[2] == "new_robot.py" else check_robot.main
+@pytest.mark.parametrize("command", GROUPS["programs"], ids=str)
+def test_a_program_takes_it(command: Command, only_parsing: None, monkeypatch) -> None:
+    parser = argparse.ArgumentParser
+    monkeypatch.setattr(parser, "parse_intermixed_args", parser.parse_args)
+    _, _, program, *words = command.words
+    if program == "replay.py":
+        given = [word.partition("=")[2] for word in words if "=" in word]
+        own = [path for path in given if PLACEHOLDERS.isdisjoint(Path(path).parts)]
+        assert all((ROOT / path).is_file() for path in own)
     with pytest.raises(Parsed):
-        main(command.words[3:])
+        PARSED[program](words)
 
 
 @pytest.mark.parametrize("command", GROUPS["window"], ids=str)
 def test_the_window_takes_it(command: Command) -> None:
     assert gzclient.parse_args(command.words[3:]).ignored == []
-
-
-@pytest.mark.parametrize("command", GROUPS["lockstep"], ids=str)
-def test_lockstep_takes_it(command: Command, only_parsing: None) -> None:
-    with pytest.raises(Parsed):
-        lockstep_launcher.main(command.words[3:])
-
-
-@pytest.mark.parametrize("command", GROUPS["replays"], ids=str)
-def test_a_replay_takes_it(command: Command, only_parsing: None) -> None:
-    given = [word.partition("=")[2] for word in command.words if "=" in word]
-    own = [path for path in given if PLACEHOLDERS.isdisjoint(Path(path).parts)]
-    assert all((ROOT / path).is_file() for path in own)
-    with pytest.raises(Parsed):
-        replay_command.main(command.words[3:])
 
 
 @pytest.mark.parametrize("command", GROUPS["bags"], ids=str)
@@ -300,17 +284,15 @@ def test_ws_takes_it(command: Command, tmp_path: Path) -> None:
         return
     if name == "check":
         script = f"source {ROOT}/tools/ws_check.sh; printf '%s\\n' \"${{CHECKS[@]}}\""
-        done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+        done = run(["bash", "-c", script], check=True)
         assert set(arguments) <= set(done.stdout.split())
         return
     arguments = [argument for argument in arguments if argument != "--fast"]  # ws's own
     is_whole = not any(argument.startswith("test/") for argument in arguments)
     if is_whole:  # one quick file will do to see that the options are known
         arguments.append("test/unit/project/test_ci.py")
-    found = subprocess.run(
-        [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-p", "no:cacheprovider", *arguments],
-        cwd=ROOT, env=dict(os.environ), capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    collect = ("--collect-only", "-qq", "-p", "no:cacheprovider")
+    found = run([sys.executable, "-m", "pytest", *collect, *arguments], cwd=ROOT)
     none_of_the_part = pytest.ExitCode.NO_TESTS_COLLECTED
     is_fine = found.returncode == 0 or (is_whole and found.returncode == none_of_the_part)
     assert is_fine, found.stdout

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.python import run
 
 pytestmark = pytest.mark.slow
 
@@ -30,11 +31,10 @@ def start(tmp_path):
 
     def start(name, port):
         arguments, _ = PROGRAMS[name]
-        environment = os.environ | {
-            "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-            "ROS_HOME": str(tmp_path),
-            "ROS_LOG_DIR": str(tmp_path),
-        }
+        master = {"ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
+        environment = (
+            os.environ | master | dict.fromkeys(("ROS_HOME", "ROS_LOG_DIR"), str(tmp_path))
+        )
         program = subprocess.Popen(
             [sys.executable, "-c", MAIN.format(*name.split()), *arguments],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
@@ -82,6 +82,5 @@ def test_without_a_master_it_says_so_until_it_is_interrupted(start, name):
 
 @pytest.mark.parametrize("name", ["shown_joints.py", "spawn_robot.py"])
 def test_help_ends_at_once(name):
-    command = [sys.executable, str(SCRIPTS / name), "--help"]
-    told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=BOUND)
+    told = run([sys.executable, SCRIPTS / name, "--help"], check=True)
     assert told.stdout.startswith(f"usage: {name}")

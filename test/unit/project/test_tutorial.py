@@ -17,7 +17,7 @@ from support.pages.code_blocks import blocks
 from cartpole import dqn_train, workbench
 
 ROOT = Path(__file__).resolve().parents[3]
-ENGLISH, CHINESE = (ROOT / "docs" / name for name in ("tutorial_dqn.md", "tutorial_dqn.zh.md"))
+DOCS = ROOT / "docs"
 DQN = ("--total-timesteps 400 --eval-frequency 200 --eval-episodes 1 --confirm-episodes 1 "
        "--learning-starts 50 --checkpoint-frequency 200")  # fmt: skip
 SHORTER = {  # command: flags behind its own
@@ -67,7 +67,7 @@ def run_line(line: str, mark: str) -> None:
 @pytest.mark.extras("imageio_ffmpeg", "optuna", "stable_baselines3", "Box2D")
 def test_every_command_of_the_tutorial_works(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for block in blocks(ENGLISH):
+    for block in blocks(DOCS / "tutorial_dqn.md"):
         if block.language == "python":
             exec(compile(block.text, "a block of the page", "exec"), {})
         elif block.language != "text":
@@ -76,8 +76,11 @@ def test_every_command_of_the_tutorial_works(tmp_path: Path, monkeypatch) -> Non
     assert [name for name in MADE if not Path(name).is_file()] == []
 
 
-def test_both_languages_have_the_same_commands() -> None:
-    mine, other = blocks(ENGLISH), blocks(CHINESE)
-    code = [re.sub(r" *#.*", "", block.text) for block in mine if block.language != "text"]
-    assert code == [re.sub(r" *#.*", "", each.text) for each in other if each.language != "text"]
-    assert [block[:2] for block in mine] == [block[:2] for block in other]
+@pytest.mark.parametrize("name", ["tutorial_dqn", "tutorial_robot"])
+def test_both_languages_have_the_same_commands(name: str) -> None:
+    pages = blocks(DOCS / f"{name}.md"), blocks(DOCS / f"{name}.zh.md")
+    mine, other = (
+        [(*each[:2], each.language == "text" or re.sub(r" *#.*", "", each.text)) for each in page]
+        for page in pages
+    )
+    assert mine == other

@@ -8,7 +8,6 @@ commands run in this process, but for those over ROS: to start each takes second
 from __future__ import annotations
 
 import os
-import re
 import shlex
 import signal
 import socket
@@ -20,13 +19,13 @@ from pathlib import Path
 
 import pytest
 from support.pages.code_blocks import Block, blocks
+from support.python import run
 
 from cartpole import workbench
 
 ROOT = Path(__file__).resolve().parents[3]
-ENGLISH, CHINESE, VEHICLE, TESTS = (
-    ROOT / "docs" / f"{name}.md"
-    for name in ("tutorial_robot", "tutorial_robot.zh", "mobile", "testing")
+ARM, VEHICLE, TESTS = (
+    ROOT / "docs" / f"{name}.md" for name in ("tutorial_robot", "mobile", "testing")
 )
 LIMIT = 300.0  # [s] for one command
 SHORT = "--total-timesteps 150 --eval-frequency 150 --eval-episodes 1 --confirm-episodes 1"
@@ -170,10 +169,7 @@ class Reader:
 
     def run(self, words: list[str]) -> str:
         """What a command printed; it has to succeed."""
-        done = subprocess.run(
-            [ROOT / "ws", *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, timeout=LIMIT, check=False,
-        )  # fmt: skip
+        done = run([ROOT / "ws", *words], cwd=self.folder, env=self.environment)
         told = f"{shlex.join(words)}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
         assert done.returncode == 0 and "Traceback" not in done.stderr, told
         return done.stdout
@@ -207,7 +203,7 @@ def test_every_command_of_the_vehicle_works(reader: Reader) -> None:
 @pytest.mark.extras("stable_baselines3")
 @pytest.mark.parametrize("reader", ["my_arm"], indirect=True)
 def test_every_command_works(reader: Reader) -> None:
-    for block in blocks(ENGLISH):
+    for block in blocks(ARM):
         reader.read(block)
     for place in ("my_arm.gif", "runs/my_arm/best.pt", "runs/tip/best.pt"):
         assert (reader.folder / place).is_file(), place
@@ -218,13 +214,3 @@ def test_every_command_works(reader: Reader) -> None:
 def test_every_test_of_the_page_passes(reader: Reader) -> None:
     for block in blocks(TESTS):
         reader.read(block)
-
-
-def test_both_languages_have_the_same_commands() -> None:
-    mine, other = blocks(ENGLISH), blocks(CHINESE)
-    assert [block[:2] for block in mine] == [block[:2] for block in other]
-
-    def code(page: list[Block]) -> list[str]:
-        return [re.sub(r" *#.*", "", block.text) for block in page]
-
-    assert code(mine) == code(other)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 import sysconfig
 import tomllib
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from support.python import run as run_command
 
 pytestmark = pytest.mark.slow
 
@@ -21,27 +21,13 @@ SOURCES = ("src", "config", "urdf", "worlds", "companions", "requirements")
 ROS = ("rospy", "roslib", "rosgraph", "rospkg", "catkin_pkg", "gazebo_msgs", "bullet_gazebo_msgs")
 
 
-def run(*command: str | Path, cwd: Path) -> str:
+def run(*command: str | Path, cwd: Path, code: int = 0) -> str:
     """Runs a command of somebody who has sourced nothing; returns what it printed."""
-    code, printed = outcome(*command, cwd=cwd)
-    assert code == 0, printed[-3000:]
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(cwd), "OMP_NUM_THREADS": "1"}
+    done = run_command(command, cwd=cwd, env=environment)
+    printed = done.stderr + done.stdout
+    assert done.returncode == code, printed[-3000:]
     return printed
-
-
-def outcome(*command: str | Path, cwd: Path) -> tuple[int, str]:
-    """The same, with the exit code."""
-    done = subprocess.run(
-        command,
-        cwd=cwd,
-        env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "OMP_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-    return done.returncode, done.stdout
 
 
 def pip(python: Path, *arguments: str | Path, cwd: Path) -> None:
@@ -56,10 +42,9 @@ def copy_sources(root: Path, sources: Path) -> None:
     for path in root.iterdir():
         if path.is_file():
             shutil.copy(path, sources)
+    ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for name in SOURCES:
-        shutil.copytree(
-            root / name, sources / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info")
-        )
+        shutil.copytree(root / name, sources / name, ignore=ignored)
 
 
 @pytest.fixture(scope="module")
@@ -89,9 +74,8 @@ def python(wheel: Path) -> Path:
     venv.create(folder / "venv")  # pip in it would take seconds
     python = folder / "venv/bin/python3"
     packages = sysconfig.get_path("purelib")
-    (folder / "venv/lib" / Path(packages).parent.name / "site-packages/workspace.pth").write_text(
-        packages
-    )
+    place = folder / "venv/lib" / Path(packages).parent.name / "site-packages"
+    (place / "workspace.pth").write_text(packages)
     pip(python, "install", wheel, cwd=folder)
     return python
 
@@ -144,8 +128,7 @@ def test_rl_workbench_trains(python: Path, tmp_path: Path) -> None:
 
 def test_what_needs_ros_says_so_in_one_line(python: Path, tmp_path: Path) -> None:
     command = (python.with_name("cartpole-pg"), "--backend", "ros", "--episodes", "1")
-    code, printed = outcome(*command, cwd=tmp_path)
-    assert code == 1
+    printed = run(*command, cwd=tmp_path, code=1)
     assert printed.startswith("pg_train.py: the backend ros needs ROS")
     assert len(printed.splitlines()) == 1
 

@@ -48,19 +48,16 @@ def test_the_command_line(ws, arguments, code, output):
 
 def test_a_check_that_there_is_none_of_installs_nothing(ws, checkout):
     result = ws("check", "lint", "nonsense", script=checkout / "ws")
-    assert result.returncode == 2 and not (checkout / ".ws").exists()
+    assert (result.returncode, result.stdout) == (2, "") and not (checkout / ".ws").exists()
 
 
 def test_signal_reaches_the_command(ws, root):
-    process = subprocess.Popen(
-        [root / "ws", "python3", "-c", "import signal; print('up', flush=True); signal.pause()"],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout.readline() == "up\n"
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == -signal.SIGTERM
-    process.stdout.close()
+    code = "import signal; print('up', flush=True); signal.pause()"
+    command = [root / "ws", "python3", "-c", code]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "up\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == -signal.SIGTERM
 
 
 def test_arguments_stay_whole(ws):
@@ -141,19 +138,12 @@ def test_callers_workspaces_are_left_out(ws, tmp_path):
     fake.write_text("#!/bin/sh\nexit 9\n")
     fake.chmod(0o755)
     stranger = str(tmp_path)
-    result = ws(
-        "python3",
-        "-c",
-        "import os, rospy; print(*os.environ.values())",
-        PATH=f"{fake.parent}:/usr/bin:/bin",
-        PYTHONPATH=stranger,
-        PYTHONHOME=stranger,
-        CMAKE_PREFIX_PATH=stranger,
-        ROS_NAMESPACE=stranger,
-        LD_LIBRARY_PATH=f"{stranger}/lib",
-        VIRTUAL_ENV=stranger,
-        CONDA_PREFIX=stranger,
-    )
+    names = ("PYTHONPATH", "PYTHONHOME", "CMAKE_PREFIX_PATH", "ROS_NAMESPACE", "VIRTUAL_ENV",
+             "CONDA_PREFIX")  # fmt: skip
+    code = "import os, rospy; print(*os.environ.values())"
+    paths = {"PATH": f"{fake.parent}:/usr/bin:/bin", "LD_LIBRARY_PATH": f"{stranger}/lib"}
+    strange = paths | dict.fromkeys(names, stranger)
+    result = ws("python3", "-c", code, **strange)
     assert result.returncode == 0, result.stderr
     assert stranger not in result.stdout.replace(str(fake.parent), "")
 

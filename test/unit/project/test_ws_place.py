@@ -5,40 +5,21 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import tempfile
 from functools import partial
 from pathlib import Path
 
 import pytest
+from support.python import run
 
-NOBODY = 65534
 STRANGE = ["ü a b", "new\nline\n", "semi;co:lon", "$HOME", 'quo"te\t', "l" * 99]
-only_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 
 
 # --- who may write -----------------------------------------------------------------------------
 
 
-def as_nobody(script, *arguments, **environment):
-    return subprocess.run(
-        [script, *arguments],
-        check=False,
-        user=NOBODY,
-        group=NOBODY,
-        extra_groups=[],
-        cwd="/",
-        env={"PATH": "/usr/bin:/bin"} | environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        start_new_session=True,  # no terminal that sudo could ask on
-    )
-
-
 @pytest.fixture
-def foreign(root):
+def foreign(root, nobody):
     """A checkout that belongs to somebody else, and an empty folder of one's own beside it."""
     with tempfile.TemporaryDirectory() as name:  # pytest's own are closed to other users
         folder = Path(name)
@@ -48,53 +29,47 @@ def foreign(root):
         shutil.copy(root / "ws", folder / "checkout")
         (folder / "checkout/requirements/base.txt").write_text("./no-such-folder\n")
         (folder / "own").mkdir()
-        os.chown(folder / "own", NOBODY, NOBODY)
+        nobody.own(folder / "own")
         yield folder
 
 
 @pytest.mark.slow
-@only_root
-def test_missing_package_without_root_or_sudo(foreign):
+def test_missing_package_without_root_or_sudo(foreign, nobody):
     (foreign / "checkout/requirements/debian.txt").write_text("no-such-package  # a comment\n")
-    result = as_nobody(foreign / "checkout/ws", "true", HOME=str(foreign / "own"))
+    result = nobody(foreign / "checkout/ws", "true", HOME=str(foreign / "own"))
     assert result.returncode == 1
     assert "administrator" in result.stderr
     assert "apt-get install --no-install-recommends no-such-package" in result.stderr
 
 
-@only_root
-def test_two_users_of_one_checkout_have_masters_of_their_own(foreign):
+def test_two_users_of_one_checkout_have_masters_of_their_own(foreign, nobody):
     """Or one's training would move the other one's robot."""
-    ours = subprocess.run(
-        [foreign / "checkout/ws", "--help"], check=True, capture_output=True, text=True
-    ).stdout
-    theirs = as_nobody(foreign / "checkout/ws", "--help", HOME=str(foreign / "own")).stdout
+    ours = run([foreign / "checkout/ws", "--help"], check=True).stdout
+    theirs = nobody(foreign / "checkout/ws", "--help", HOME=str(foreign / "own")).stdout
     ports = [re.search(r"http://127.0.0.1:(2\d{4})\b", text)[1] for text in (ours, theirs)]
     assert ports[0] != ports[1]
 
 
-@only_root
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("variable", "place"), [("HOME", "own/.cache/cartpole"), ("CARTPOLE_WS_DIR", "own")]
 )
-def test_what_cannot_be_made_in_the_checkout_is_made_elsewhere(foreign, variable, place):
-    result = as_nobody(foreign / "checkout/ws", "true", **{variable: str(foreign / "own")})
+def test_what_cannot_be_made_in_the_checkout_is_made_elsewhere(foreign, nobody, variable, place):
+    result = nobody(foreign / "checkout/ws", "true", **{variable: str(foreign / "own")})
     assert result.returncode == 1
     assert f"ready once, in {foreign / place}/" in result.stderr
     assert "no-such-folder" in result.stderr, "it came as far as the Python packages"
     (made,) = (foreign / place).iterdir()
     assert (made / "venv/bin/python3").exists()
     assert not (foreign / "checkout/.ws").exists()
-    cleaned = as_nobody(foreign / "checkout/ws", "clean", **{variable: str(foreign / "own")})
+    cleaned = nobody(foreign / "checkout/ws", "clean", **{variable: str(foreign / "own")})
     assert cleaned.returncode == 0
     assert not made.exists()
 
 
-@only_root
 @pytest.mark.parametrize("home", [{}, {"HOME": "/no-home"}, {"CARTPOLE_WS_DIR": "own"}], ids=str)
-def test_nowhere_to_write_is_one_line(foreign, home):
-    result = as_nobody(foreign / "checkout/ws", "true", **home)
+def test_nowhere_to_write_is_one_line(foreign, nobody, home):
+    result = nobody(foreign / "checkout/ws", "true", **home)
     assert result.returncode == 1
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"ws: nothing can be made in {foreign}/checkout/.ws")
@@ -102,17 +77,16 @@ def test_nowhere_to_write_is_one_line(foreign, home):
 
 
 @pytest.mark.slow
-def test_a_workspace_that_is_ready_serves_who_cannot_write_it(open_root):
+def test_a_workspace_that_is_ready_serves_who_cannot_write_it(open_root, nobody):
     """As on a read-only disk; what commands write goes to the user's own folders."""
     with tempfile.TemporaryDirectory() as home:
-        os.chown(home, NOBODY, NOBODY)
+        nobody.own(home)
         code = "import os, rospy, trimesh, bullet_gazebo_msgs.srv; print(os.environ['ROS_LOG_DIR'])"
-        result = as_nobody(open_root / "ws", "python3", "-c", code, HOME=home)
+        result = nobody(open_root / "ws", "python3", "-c", code, HOME=home)
         assert (result.returncode, result.stderr) == (0, "")
         assert result.stdout.startswith(f"{home}/.cache/cartpole/")
-        files = as_nobody(
-            open_root / "ws", "roslaunch", "--files", "cartpole", "pg_train.launch", HOME=home
-        )
+        launch = ("roslaunch", "--files", "cartpole", "pg_train.launch")
+        files = nobody(open_root / "ws", *launch, HOME=home)
         assert files.returncode == 0, files.stderr
 
 
@@ -146,9 +120,7 @@ def test_a_strange_path_gets_a_plain_name(ws, strange):
 def test_all_works_below_a_strange_path(ws, root, tmp_path, tmp_path_factory):
     copy = tmp_path / "ü b:c$d(e&f%g;h\"i'j#k\\l\nm\n"
     hidden = shutil.ignore_patterns(".*", "__pycache__", "runs", "docs", "*_msgs")
-    shutil.copytree(
-        root, copy, ignore=hidden
-    )  # generating messages takes long, and isn't the point
+    shutil.copytree(root, copy, ignore=hidden)  # to generate messages takes long
     (copy / "docs").mkdir()
     (copy / "requirements/base.txt").write_text("")
     home = tmp_path_factory.mktemp("home")

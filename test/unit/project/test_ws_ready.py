@@ -7,6 +7,7 @@ import re
 import subprocess
 
 import pytest
+from support.python import run
 
 # Debian's tools on a machine where two packages are missing, as a file says.
 TOOLS = {
@@ -53,13 +54,11 @@ def test_what_is_ready_is_ready_in_every_language(root, tmp_path):
         '#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n'
     )
     tool.chmod(0o755)
+    plain = {"PATH": f"{tmp_path}:/usr/bin:/bin", "ROOT": str(root)}
     found = {
-        subprocess.run(
-            ["bash", "-c", KEYS], check=True, cwd=root, capture_output=True, text=True,
-            env={"PATH": f"{tmp_path}:/usr/bin:/bin", "ROOT": str(root)} | language,
-        ).stdout
+        run(["bash", "-c", KEYS], check=True, cwd=root, env=plain | language).stdout
         for language in ({"LC_ALL": "C"}, {"LC_ALL": "C.UTF-8"}, {"LANG": "C.UTF-8"})
-    }  # fmt: skip
+    }
     assert len(found) == 1
     assert re.fullmatch(r"([0-9a-f]{64}\n){2}", found.pop())
 

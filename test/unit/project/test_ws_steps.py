@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sysconfig
 import zipfile
 from pathlib import Path
 
 import pytest
+from support.python import run
 
 STEPS = """set -euo pipefail
 ROOT=$PWD VENV=none WS={folder}
@@ -21,15 +21,12 @@ python_version() {{ echo {version}; }}
 def steps(root, tmp_path):
     """Returns a function that runs code with the functions of ws_steps.sh; returns what it prints."""
 
-    def run(code, version="3.13", **environment):
-        done = subprocess.run(
-            ["bash", "-c", STEPS.format(folder=tmp_path, version=version, code=code)],
-            cwd=root, capture_output=True, text=True, check=True,
-            env={"PATH": "/usr/bin:/bin"} | environment,
-        )  # fmt: skip
-        return done.stdout
+    def printed(code, version="3.13", **environment):
+        script = STEPS.format(folder=tmp_path, version=version, code=code)
+        environment = {"PATH": "/usr/bin:/bin"} | environment
+        return run(["bash", "-c", script], cwd=root, check=True, env=environment).stdout
 
-    return run
+    return printed
 
 
 def test_debian_13_has_a_torch_of_its_own(steps):
@@ -44,13 +41,9 @@ def test_debian_13_has_a_torch_of_its_own(steps):
 @pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
 def test_a_lock_file_pins_all_that_the_lists_name(steps, root, version):
     lock = Path(steps("lock_file", version).strip()).read_text()
-    lists = "".join(
-        (root / f"requirements/{name}.txt").read_text()
-        for name in ("base", "test", "extras", "docs")
-    )
-    pins = {
-        line.split()[0].rstrip(";") for line in lists.splitlines() if "==" in line.split("#")[0]
-    }
+    files = (root / f"requirements/{name}.txt" for name in ("base", "test", "extras", "docs"))
+    lines = "".join(file.read_text() for file in files).splitlines()
+    pins = {line.split()[0].rstrip(";") for line in lines if "==" in line.split("#")[0]}
     other = "pybullet==3.2.7" if version > "3.11" else "pybullet-arm64==3.2.8"
     assert {pin for pin in pins if not pin.startswith("torch")} - set(lock.splitlines()) == {other}
     assert "torch==" not in lock and "nvidia" not in lock
@@ -77,7 +70,7 @@ def test_what_pip_was_killed_at_is_installed_again(steps, tmp_path):
         for name, text in WHEEL.items():
             wheel.writestr(name, text)
     place = tmp_path / "venv"
-    subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", place], check=True)
+    run(["/usr/bin/python3", "-m", "venv", "--without-pip", place], check=True)
     (packages,) = place.glob("lib/*/site-packages")
     (packages / "pip.pth").write_text(sysconfig.get_path("purelib"))  # this environment's pip
     code = f"VENV={place}; pip_in_venv --no-index --find-links {tmp_path} half==1.0"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from support.python import run
 
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
@@ -293,10 +294,7 @@ def test_a_compiler_comes_with_the_first_package_that_is_built(
     for name in ("companions", "build"):
         (tmp_path / "ws/stamp" / name).touch()
     code = COMPILER.format(place=tmp_path / "ws", missing=missing, folder=tmp_path / "theirs")
-    done = subprocess.run(
-        ["bash", "-c", code], cwd=root, capture_output=True, text=True, check=True
-    )
-    assert done.stdout == made
+    assert run(["bash", "-c", code], cwd=root, check=True).stdout == made
 
 
 def test_two_at_once(root, tmp_path):
@@ -311,19 +309,14 @@ def test_two_at_once(root, tmp_path):
     assert sum("building" in text for text in texts) == 1
 
 
-def test_a_folder_and_a_workspace_that_cannot_be_written(open_root, workspace):
-    nobody = 65534
+def test_a_folder_and_a_workspace_that_cannot_be_written(open_root, nobody, workspace):
     with tempfile.TemporaryDirectory() as home:  # pytest's own are closed to other users
         shutil.copytree(workspace, f"{home}/theirs")
         os.chmod(home, 0o755)
         os.mkdir(f"{home}/own")
-        os.chown(f"{home}/own", nobody, nobody)
-        done = subprocess.run(
-            [open_root / "ws", "--with", f"{home}/theirs", "rosrun", "my_messages", "drive"],
-            user=nobody, group=nobody, extra_groups=[], cwd="/", check=False, text=True,
-            env={"PATH": "/usr/bin:/bin", "HOME": f"{home}/own"}, stdin=subprocess.DEVNULL,
-            capture_output=True, timeout=180,
-        )  # fmt: skip
+        nobody.own(f"{home}/own")
+        drive = ("--with", f"{home}/theirs", "rosrun", "my_messages", "drive")
+        done = nobody(open_root / "ws", *drive, HOME=f"{home}/own")
         assert (done.returncode, done.stdout) == (0, "1 x: 2\n"), done.stderr
         assert f"{home}/own/.cache/cartpole" in done.stderr
 

@@ -31,10 +31,9 @@ def test_a_state_has_what_each_sensor_measured(env: RobotEnv) -> None:
     assert sensors["front_laser"].ranges.shape == (24,)
     assert sensors["front_laser"].ranges[12] == pytest.approx(0.4 - 0.22, abs=0.08)
     assert sensors["sonar"].ranges == pytest.approx([0.18], abs=0.05)
-    assert (
-        sensors["camera"].image.shape == (12, 16, 3) and sensors["camera"].image.dtype == np.uint8
-    )
-    assert sensors["deep"].depth.shape == (12, 16) and sensors["deep"].depth.dtype == np.float32
+    image, depth = sensors["camera"].image, sensors["deep"].depth
+    assert (image.shape, image.dtype) == ((12, 16, 3), np.uint8)
+    assert (depth.shape, depth.dtype) == ((12, 16), np.float32)
     assert np.linalg.norm(sensors["imu"].linear_acceleration) == pytest.approx(9.8, abs=0.1)
     assert sensors["old_imu"].linear_acceleration == pytest.approx([0.0] * 3)
     assert sensors["bumper"].contacts == []
@@ -55,18 +54,15 @@ def test_each_measures_at_its_own_rate_from_the_reset_on(env: RobotEnv) -> None:
             for name, reading in env.state.sensors.items():
                 times.setdefault(name, []).append(reading.time)
         assert times["front_laser"] == pytest.approx(np.arange(1, 8) * 0.02)
-        assert times["sonar"] == pytest.approx(
-            [0.0, 0.034, 0.034, 0.067, 0.1, 0.1, 0.134], abs=2e-3
-        )
+        at_30_hz = [0.0, 0.034, 0.034, 0.067, 0.1, 0.1, 0.134]
+        assert times["sonar"] == pytest.approx(at_30_hz, abs=2e-3)
 
 
 def test_seeds_repeat_noise_and_episodes_differ(env: RobotEnv) -> None:
     given = rollout(env, 200, seed=3)
     assert differences(given, rollout(env, 200, seed=3)) == ""
     assert not np.array_equal(given[0][0], env.reset()[0])
-    assert any(
-        each[1] > 0.0 for each in given if len(each) == 5
-    )  # the bumper has touched the crate
+    assert any(each[1] > 0.0 for each in given if len(each) == 5)  # the bumper has touched it
 
 
 def test_an_impossible_sensor_is_told() -> None:

@@ -1,6 +1,5 @@
 """The conformance suite finds each fault that it is there for, and says what was seen and expected."""
 
-import subprocess
 import sys
 from functools import partial
 from typing import Any
@@ -9,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
+from support.python import run
 from support.scenes import broken
 from support.scenes.broken import of, wobbling
 from support.scenes.rover import ROVER, Push
@@ -29,9 +29,8 @@ def test_sound_environments_pass(task):
 
 def test_without_asserts_it_checks_nothing_and_says_so():
     text = "from robot_envs.testing import check_robot_env; check_robot_env('any')"
-    command = [sys.executable, "-O", "-c", text]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert "RuntimeError: check_robot_env checks by assert" in run.stderr
+    told = run([sys.executable, "-O", "-c", text]).stderr
+    assert "RuntimeError: check_robot_env checks by assert" in told
 
 
 @pytest.mark.slow
@@ -46,6 +45,11 @@ def test_so_does_one_with_an_id_and_options():
     check_robot_env("suite/Reach-v0", options=options, steps=STEPS)
     with pytest.raises(AssertionError, match="NameNotFound: Environment `Rich` doesn't exist"):
         check_robot_env("suite/Rich-v0")
+
+
+def swallows(**options: Any) -> RobotEnv:
+    known = ("backend", "max_steps", "render_mode", "width", "height")
+    return RobotEnv(SOLO, Hold(), **{name: options[name] for name in known if name in options})
 
 
 SMALL = Box(-1e-6, 1e-6, (2,), np.float32)
@@ -69,19 +73,8 @@ FAULTS = {
         r"step\(\) with the action array\(\[nan, nan\].* raises nothing, and not ValueError"),
     "moves first": (episodes.wrong_actions, of(wobbling, broken.MovesFirst),
         "a refused action has moved something: step 1: the observation is"),
-    "swallows options": (
-        episodes.wrong_options,
-        lambda **options: RobotEnv(
-            SOLO,
-            Hold(),
-            **{
-                k: v
-                for k, v in options.items()
-                if k in ("backend", "max_steps", "render_mode", "width", "height")
-            },
-        ),
-        "making it with the options {'no_such_option': 1} raises nothing",
-    ),
+    "swallows options": (episodes.wrong_options, swallows,
+        "making it with the options {'no_such_option': 1} raises nothing"),
     "never closes": (episodes.closed, of(Hold, broken.NeverCloses),
         "behind close\\(\\) raises error \\(Not connected to physics server.\\), not ClosedEnvironmentError"),
     "one picture": (episodes.pictures, of(Hold, broken.OnePicture), "pictures of 12 steps are all the same"),
@@ -171,10 +164,9 @@ def test_an_environments_own_error_is_told_once_and_is_the_cause():
 
 @pytest.mark.slow
 def test_all_faults_are_told_together():
+    make = of(lambda: broken.kept(broken.drawing(Reach())), broken.SmallPicture)
     with pytest.raises(AssertionError) as error:
-        check_robot_env(
-            of(lambda: broken.kept(broken.drawing(Reach())), broken.SmallPicture), steps=STEPS
-        )
+        check_robot_env(make, steps=STEPS)
     text = str(error.value)
     assert text.startswith("the environment:\n- ")
     for part in ("observations are new (over bullet): ", "pictures (over bullet): ", "seeding ("):

@@ -1,10 +1,7 @@
 """XML-RPC with a time limit, and the master that is asked."""
 
 import contextlib
-import os
 import socket
-import subprocess
-import sys
 import threading
 import time
 
@@ -54,27 +51,24 @@ def test_what_is_not_ross_way(master, method):
         ros_master.call_node(master.uri, method, "a")
 
 
-def test_nobody_listens():
-    with socket.socket() as reserved:  # bound, and nobody listens
-        reserved.bind(("127.0.0.1", 0))
-        uri = f"http://127.0.0.1:{reserved.getsockname()[1]}"
-        with pytest.raises(ros_master.NobodyListens, match="Connection refused"):
-            ros_master.call_node(uri, "getPid")
-        with ros_master.using(uri):
-            assert not ros_master.is_up()
-            assert not ros_master.is_up_or_startable()
+def test_nobody_listens(nobody_listens):
+    with pytest.raises(ros_master.NobodyListens, match="Connection refused"):
+        ros_master.call_node(nobody_listens, "getPid")
+    with ros_master.using(nobody_listens):
+        assert not ros_master.is_up()
+        assert not ros_master.is_up_or_startable()
 
 
-def test_a_server_that_says_nothing():
-    over = threading.Event()
-    with listening(lambda client: over.wait()) as uri, ros_master.using(uri):
-        begin = time.monotonic()
-        with pytest.raises(ros_master.NoAnswer, match=r"no answer within 0.3 s"):
-            ros_master.call_node(uri, "getPid", timeout=LIMIT)
-        assert time.monotonic() - begin >= LIMIT
-        with pytest.raises(ros_master.MasterDown, match="port is in use, and not by a ROS master"):
-            ros_master.is_up_or_startable()
-        over.set()
+def test_a_server_that_says_nothing(nobody_answers):
+    begin = time.monotonic()
+    with pytest.raises(ros_master.NoAnswer, match=r"no answer within 0.3 s"):
+        ros_master.call_node(nobody_answers, "getPid", timeout=LIMIT)
+    assert time.monotonic() - begin >= LIMIT
+    with (
+        ros_master.using(nobody_answers),
+        pytest.raises(ros_master.MasterDown, match="port is in use, and not by a ROS master"),
+    ):
+        ros_master.is_up_or_startable()
 
 
 @pytest.mark.parametrize("answer", [b"", b"220 mail.example.com ESMTP\r\n"])
@@ -107,18 +101,6 @@ def test_another_master_is_for_the_block_and_the_thread_only(monkeypatch):
     assert (seen, ros_master.uri()) == (["http://here:1"], "http://here:1")
 
 
-@pytest.mark.parametrize(
-    ("modules", "absent"),
-    [("ros_calls.master", "rospy"), ("ros_calls.service, ros_calls.waiting", "std_srvs")],
-)
-def test_what_an_import_brings_along(modules, absent):
-    """`gz` must start at once; and nothing here needs a master or a node to be imported."""
-    code = f"import {modules}, sys; sys.exit({absent!r} in sys.modules)"
-    environment = os.environ | {"ROS_MASTER_URI": "http://127.0.0.1:1"}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, check=False)
-    assert done.returncode == 0
-
-
 def test_a_node_that_answers_lives(master, other_master) -> None:
     assert ros_master.living_address("/gazebo") is None
     master.nodes["/gazebo"] = other_master.uri
@@ -127,17 +109,10 @@ def test_a_node_that_answers_lives(master, other_master) -> None:
     assert ros_master.living_address("/gazebo") == other_master.uri
 
 
-def test_one_that_was_killed_does_not(master) -> None:
-    with socket.socket() as reserved:  # bound only: connections are refused
-        reserved.bind(("127.0.0.1", 0))
-        master.nodes["/gazebo"] = f"http://127.0.0.1:{reserved.getsockname()[1]}"
-        assert ros_master.living_address("/gazebo") is None
-
-
-def test_nor_does_one_that_says_nothing(master) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as deaf:
-        master.nodes["/gazebo"] = f"http://127.0.0.1:{deaf.getsockname()[1]}"
-        assert ros_master.living_address("/gazebo", timeout=0.2) is None
+@pytest.mark.parametrize("kind", ["nobody_listens", "nobody_answers"])
+def test_one_that_was_killed_does_not_nor_one_that_says_nothing(master, kind, request) -> None:
+    master.nodes["/gazebo"] = request.getfixturevalue(kind)
+    assert ros_master.living_address("/gazebo", timeout=0.2) is None
 
 
 @pytest.mark.parametrize(

@@ -24,9 +24,7 @@ BOUND = 60.0  # [s] for anything that a test waits for
 @pytest.fixture(autouse=True)
 def place(no_master, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(
-        _processes, "LEFTOVERS", 0.3
-    )  # a shell has its background jobs ignore SIGINT
+    monkeypatch.setattr(_processes, "LEFTOVERS", 0.3)  # a shell's background jobs ignore SIGINT
     yield tmp_path
     _programs.end(_programs.started())
 
@@ -66,8 +64,9 @@ sys.stdin.read()
 """
 
 
-def test_what_is_started_is_remembered_and_forgotten_once_ended():
+def test_what_is_started_has_its_session_is_remembered_and_forgotten_once_ended():
     handle = _programs.start(SLEEP, "node", "sleeper")
+    assert os.getsid(handle.process.pid) == handle.process.pid
     assert _programs.started() == [handle.start]
     assert _programs.end(_programs.started())
     assert not runs(handle.process.pid)
@@ -89,29 +88,18 @@ def test_a_program_whose_threads_outlive_its_main_thread_has_ended_when_it_is_sa
     assert handle.exit_code() is not None
 
 
-def test_it_has_a_session_of_its_own():
-    handle = _programs.start(SLEEP, "node", "sleeper")
-    assert os.getsid(handle.process.pid) == handle.process.pid
-
-
-def test_children_in_other_sessions_are_ended_too(place):
+@pytest.mark.slow
+@pytest.mark.parametrize("orphaned", [False, True])
+def test_children_in_other_sessions_are_ended_too_and_those_of_a_killed_parent(place, orphaned):
     code = "setsid sleep 1000 & echo $! > $0; wait"
     handle = _programs.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
     child = read_number(place / "pid")
-    assert _programs.end([handle.start])
+    if orphaned:
+        handle.process.kill()
+        handle.process.wait()
+        assert runs(child)
+    assert ros_node.ros_kill_all_processes() if orphaned else _programs.end([handle.start])
     assert not runs(child)
-
-
-@pytest.mark.slow
-def test_orphans_of_a_killed_parent_are_ended_too(place):
-    code = "setsid sleep 1000 & echo $! > $0; wait"
-    handle = _programs.start(["sh", "-c", code, str(place / "pid")], "launch", "parent")
-    orphan = read_number(place / "pid")
-    handle.process.kill()
-    handle.process.wait()
-    assert runs(orphan)
-    assert ros_node.ros_kill_all_processes()
-    assert not runs(orphan)
 
 
 def test_another_masters_processes_are_not_touched(monkeypatch):
@@ -135,7 +123,7 @@ def test_names_of_this_machine_mean_the_same_master(monkeypatch):
 )
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
     monkeypatch.setitem(_processes.END_PATIENCE, "node", 0.3)
-    monkeypatch.setattr(_processes, "AFTER_TERM", 0.3)
+    monkeypatch.setattr(_processes, "AFTER_TERM", 0.3 if number == signal.SIGKILL else BOUND)
     code = "import signal; [signal.signal(getattr(signal, 'SIG' + n), signal.SIG_IGN)"
     code += f" for n in '{trap}'.split()]; open({str(place / 'pid')!r}, 'w').write('1\\n'); "
     handle = _programs.start([sys.executable, "-c", code + "signal.pause()"], "node", "stubborn")
@@ -233,9 +221,8 @@ def test_output_goes_to_a_log_and_its_error_is_the_reason():
 def test_a_start_is_waited_for(capsys, command, is_there, text):
     handle = _programs.start(command, "node", "sleeper")
     timeout = BOUND if command is not SLEEP else 0.1
-    started = _programs.await_start(
-        handle, lambda: is_there, "not there", timeout, None, may_end=False
-    )
+    wait = (handle, lambda: is_there, "not there", timeout, None)
+    started = _programs.await_start(*wait, may_end=False)
     assert bool(started) is is_there
     assert text in capsys.readouterr().err
 

@@ -1,12 +1,11 @@
 """The robots that come along: their files, and that their environments are what Gymnasium wants."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from support.python import run_python
 
 import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.making import named
@@ -22,8 +21,7 @@ def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> No
         "import robot_envs.robots, sys;"
         "print([each for each in sys.modules if 'pybullet' in each or 'robots.' in each])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    assert run_python(code).stdout == "[]\n"
 
 
 @pytest.mark.parametrize("identifier", IDS)

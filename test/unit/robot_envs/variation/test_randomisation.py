@@ -58,11 +58,7 @@ def test_a_pair_is_a_range(one, other, seed):
 
 
 @settings(max_examples=50)
-@given(
-    st.sets(
-        st.sampled_from([option.name for option in OPTIONS if option.name != "surface_friction"])
-    )
-)
+@given(st.sets(st.sampled_from([each.name for each in OPTIONS if each.name != "surface_friction"])))
 def test_options_do_not_change_what_others_draw_nor_the_stream(chosen):
     everything = dict.fromkeys([*NAMES, "gravity"], 0.5)
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
@@ -102,10 +98,7 @@ def test_options_may_be_what_a_command_line_makes_of_them():
         ({"mass": float("nan")}, "of mass is a number or a pair"),
         ({"damping": (-1.0, 1.0)}, "of damping from -1 to 1: it must lie within 0 and"),
         ({"gravity": {"z": 0.1}}, "of gravity is one for the world"),
-        (
-            {"mass": {"kart": 0.1}},
-            "of mass: there is no link 'kart' that moves and has a mass; did you mean 'cart'?",
-        ),
+        ({"mass": {"kart": 0.1}}, "no link 'kart' that moves and has a mass; did you mean 'cart'?"),
         ({"damping": {"rial": 0.1}}, "there is no joint 'rial' that moves; did you mean 'rail'?"),
         ({"gains": {"motors": 0.1}}, "no controller 'motors' with a PID; there are servo_position"),
         ({"surface_friction": 0.1}, "of surface_friction: the robot has no link with a collision"),

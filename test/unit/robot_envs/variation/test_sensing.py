@@ -120,10 +120,7 @@ def test_noise_comes_before_the_steps(rng):
         ({"noise": -0.1}, "sensor_noise must be a number >= 0, not -0.1"),
         ({"noise": float("nan")}, "sensor_noise"),
         ({"noise": [0.1, 0.2, 0.3]}, r"sensor_noise is a number or a pair \(position, velocity\)"),
-        (
-            {"noise": {"elbo": 0.1}},
-            r"sensor_noise: there is no joint 'elbo'; did you mean 'elbow'\?",
-        ),
+        ({"noise": {"elbo": 0.1}}, r"sensor_noise: there is no joint 'elbo'; did you mean 'elbow'"),
         ({"delay": -1}, "sensor_delay must be a number of control steps from 0 to 1000, not -1"),
         ({"delay": 1.5}, "sensor_delay"),
         ({"encoder_step": -0.1}, "encoder_step must be a number >= 0"),
