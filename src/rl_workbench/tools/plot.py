@@ -59,7 +59,7 @@ def run_panels(runs: Sequence[Run], over: str) -> "list[Panel]":
         return SeedCurve(rewards.steps if over == "steps" else episodes, rewards.values)
 
     def success(run: Run) -> "SeedCurve | None":
-        rates = curve_of(run, SUCCESS)
+        rates = curve_of(run.folder, SUCCESS)
         episodes = np.searchsorted(training_curve(run).steps, rates.steps, side="right")
         steps = rates.steps if over == "steps" else episodes.astype(float)
         return SeedCurve(steps, rates.values) if len(rates.values) else None
@@ -88,7 +88,7 @@ def _seed_curve(run: Run, tag: str) -> "SeedCurve | None":
     from rl_workbench.plotting import SeedCurve
 
     try:
-        curve, is_complete = curve_of(run, tag), bool(summary_of(run).get("complete"))
+        curve, is_complete = curve_of(run.folder, tag), bool(summary_of(run).get("complete"))
     except WorkbenchError:
         return None
     return SeedCurve(curve.steps, curve.values, is_complete) if len(curve.values) else None

@@ -78,7 +78,7 @@ def examine(
         score, success = (played.mean_return, played.success_rate) if played else (None, None)
     last = attempt(lambda: _greedy(run, episodes, "last", warn)) if also_last else None
     solved_step = attempt(lambda: _solved(run))
-    evaluated = attempt(lambda: curve_of(run, EVALUATION).values)
+    evaluated = attempt(lambda: curve_of(run.folder, EVALUATION).values)
     return RunResult(
         group=group, seed=run.seed, run=run.name, score=score, success=success,
         final=last.mean_return if last else None, training_mean=trained,
@@ -100,9 +100,9 @@ def _greedy(run: Run, episodes: int, which: str, warn: Callable[[str], None]) ->
 def _solved(run: Run) -> int | None:
     """Returns the step of the first (if possible confirmed) evaluation at the threshold, or None."""
     line = threshold(run.env_id)
-    curve = curve_of(run, CONFIRMED)
+    curve = curve_of(run.folder, CONFIRMED)
     if not len(curve.values):
-        curve = curve_of(run, EVALUATION)
+        curve = curve_of(run.folder, EVALUATION)
     above = np.flatnonzero(curve.values >= (math.inf if line is None else line))
     return int(curve.steps[above[0]]) if len(above) else None
 

@@ -12,8 +12,7 @@ import numpy as np
 from file_access.content import open_text
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.storage import CONFIG_RECORD, read_json, read_record, reading
-from rl_workbench.training.scalar_log import RETURN
-from web_viewer.table import NAME as SCALARS
+from rl_workbench.training.scalar_log import RETURN, SCALARS
 
 SUMMARY = "summary.json"
 SUITE_RECORD = "suite.json"  # in the folder of a benchmark
@@ -141,15 +140,15 @@ def _matching(pattern: str, warn: Callable[[str], None]) -> list[Run]:
 
 def training_curve(run: Run) -> Curve:
     """Returns the return of each finished training episode."""
-    curve = curve_of(run, RETURN)
+    curve = curve_of(run.folder, RETURN)
     if not len(curve.values):
         raise WorkbenchError(f"{run.folder}: no episode has ended yet")
     return curve
 
 
-def curve_of(run: Run, tag: str) -> Curve:
-    """Returns the values of a tag; may be empty."""
-    path = run.folder / SCALARS
+def curve_of(folder: Path, tag: str) -> Curve:
+    """Returns the values of a tag in a run folder; may be empty."""
+    path = folder / SCALARS
     if not path.exists():
         return Curve(*np.empty((2, 0)))
     wrong = (KeyError, ValueError, TypeError, csv.Error)

@@ -21,12 +21,12 @@ from rl_workbench.storage import as_text, write_file
 from rl_workbench.tools.flags import add_job_flags, number
 from rl_workbench.tools.jobs import Job
 from rl_workbench.tools.pool import Pool, claimed, job_pool
+from rl_workbench.tools.runs import curve_of
 from rl_workbench.training.algorithms import ALGORITHMS
 from rl_workbench.training.options import default_file, known_options, read_section, section_names
 from rl_workbench.training.progress import tell
-from rl_workbench.training.scalar_log import EVALUATION
+from rl_workbench.training.scalar_log import EVALUATION, SCALARS
 from rl_workbench.training.train import choose
-from web_viewer.table import GrowingTable
 
 RECORD, STUDY, RANGES = "sweep.json", "study.db", "sweep.yaml"
 PRUNERS = ("median", "hyperband", "none")
@@ -193,20 +193,21 @@ class Judge:
 
     def __init__(self, trial: Any, folder: Path) -> None:
         self.evaluations = 0
-        self._trial, self._table = trial, GrowingTable(folder)
+        self._trial, self._folder, self._size = trial, folder, 0
         self._is_pruned = False
 
     def is_promising(self) -> bool:
         """Reports new evaluations; returns whether to continue the trial."""
-        has_more = True
-        while has_more and not self._is_pruned:
-            update = self._table.read()
-            has_more = update.has_more
-            for _, tag, value in update.points:
-                if tag == EVALUATION and not self._is_pruned:
-                    self.evaluations += 1
-                    self._trial.report(value, self.evaluations)
-                    self._is_pruned = self._trial.should_prune()
+        path = self._folder / SCALARS
+        size = path.stat().st_size if path.exists() else 0
+        if size != self._size:
+            self._size = size
+            for value in curve_of(self._folder, EVALUATION).values[self.evaluations :].tolist():
+                self.evaluations += 1
+                self._trial.report(value, self.evaluations)
+                self._is_pruned = self._trial.should_prune()
+                if self._is_pruned:
+                    break
         return not self._is_pruned
 
 

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from file_access.content import open_file
-from web_viewer.table import HEADER, NAME
 
+SCALARS = "scalars.csv"  # in a run folder
+HEADER = b"step,tag,value,wall_time\n"
 # Tags, as CleanRL and Stable-Baselines3 name them.
 RETURN, EVALUATION = "charts/episodic_return", "eval/mean_reward"
 CONFIRMED = "eval/confirmed_reward"  # of a policy that became the best one
@@ -42,7 +43,7 @@ class ScalarLog:
         length: int = 0,
         say: Callable[[str], None] = print,
     ) -> None:
-        path = folder / NAME
+        path = folder / SCALARS
         points = _truncated(path, length, say) if length else []
         if not points:
             path.write_bytes(HEADER)

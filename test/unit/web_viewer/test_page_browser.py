@@ -67,9 +67,14 @@ def test_a_screen_shows_the_panel_beside_the_scene(page):
     with Browser(page, size=SCREEN) as seen:
         seen.resize(*SCREEN)
         seen.wait_for_text("Push")
-        scene, panel = boxes(seen)
-        assert scene[3] == panel[3] == pytest.approx(height, abs=1)
-        assert 0.7 * width < scene[2] <= panel[0] < panel[2] == pytest.approx(width, abs=3)
+
+        def are_beside() -> bool:
+            scene, panel = boxes(seen)
+            heights = scene[3] == panel[3] == pytest.approx(height, abs=1)
+            at_edge = panel[2] == pytest.approx(width, abs=3)
+            return heights and at_edge and 0.7 * width < scene[2] <= panel[0] < panel[2]
+
+        wait_for(are_beside, "panel beside the scene")  # the layout may follow the texts
 
 
 def test_a_page_of_which_only_the_beginning_has_come_says_that_it_is_loading(page):

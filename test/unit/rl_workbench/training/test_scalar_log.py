@@ -37,7 +37,7 @@ def test_tensorboards_file_that_may_not_grow_fails_where_it_is_written(tmp_path:
     with pytest.raises(OSError, match="File too large"):
         for step in range(LARGEST):
             log.add(step, {"a": 1.0})
-    assert (tmp_path / scalar_log.NAME).stat().st_size < LARGEST
+    assert (tmp_path / scalar_log.SCALARS).stat().st_size < LARGEST
     assert threading.active_count() == threads  # nothing that fails elsewhere
     with pytest.raises(OSError, match="File too large"):
         log.close()
