@@ -1,18 +1,11 @@
-"""The lock of a folder: one process at a time; the kernel releases it when its holder ends.
-
-Temporary folders are locked, too: so those of killed processes are known.
-"""
+"""The lock of a folder: one process at a time; the kernel releases it when its holder ends."""
 
 import fcntl
-import functools
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-
-SCRATCH = ("cartpole_", ".tmp")  # begin and end of a temporary folder's name
 
 
 @contextmanager
@@ -49,23 +42,8 @@ def is_locked(folder: Path) -> bool:
 
 @contextmanager
 def scratch_folder(parent: str | None = None) -> Iterator[Path]:
-    """Makes a temporary folder for the block; the first one also removes those of killed processes."""
-    place = Path(parent or tempfile.gettempdir())
-    _sweep(place)
-    with ExitStack() as stack:
-        folder = None
-        while folder is None:
-            made = Path(tempfile.mkdtemp(SCRATCH[1], SCRATCH[0], place))
-            with suppress(BlockingIOError, FileNotFoundError):  # another process has just swept it
-                stack.enter_context(locked_folder(made))
-                folder = made
-        stack.callback(shutil.rmtree, folder, ignore_errors=True)
-        yield folder
-
-
-@functools.cache
-def _sweep(place: Path) -> None:
-    """Removes the temporary folders that no process holds, known by the form of `mkdtemp`'s names."""
-    for folder in place.glob(("[a-z0-9_]" * 8).join(SCRATCH)):
-        with suppress(OSError), locked_folder(folder):
-            shutil.rmtree(folder, ignore_errors=True)
+    """Makes a temporary folder for the block."""
+    with tempfile.TemporaryDirectory(
+        prefix="cartpole_", dir=parent, ignore_cleanup_errors=True
+    ) as name:
+        yield Path(name)

@@ -22,7 +22,7 @@ TRAIN = "train"
 # Name: line of help. The module rl_workbench.tools.NAME has add_flags and run.
 COMMANDS = {
     "eval": "greedy episodes of a run: mean, deviation, every episode",
-    "enjoy": "watch greedy episodes in a window, or on a page in the browser",
+    "enjoy": "watch greedy episodes in the environment's window",
     "view": "a page in the browser that plays episodes, also while it trains",
     "record": "episodes as GIF or MP4; needs no display",
     "plot": "the training curves of runs as PNG",

@@ -23,6 +23,7 @@ from rl_workbench.tools.recording import (
 )
 from rl_workbench.tools.runs import open_run
 from rl_workbench.training.progress import tell, warn
+from web_viewer.address import LOOPBACK
 from web_viewer.server import ServedPage
 
 PERIOD = 1.0 / 30.0  # [s] between two pictures
@@ -36,20 +37,19 @@ def show_run(
     folder: Path,
     policies: tuple[str, ...],
     seed: int,
-    episodes: int,
     env_options: dict[str, Any],
     *,
-    host: str,
-    port: int | None,
-    browser: bool,
     interrupt: Interrupt,
+    host: str = LOOPBACK,
+    port: int | None = None,
+    browser: bool = True,
     beside_training: bool = False,
 ) -> None:
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
-    It plays `episodes` with consecutive seeds from `seed` on, again and again, at first by the first of the
-    policies, with options of the environment on top of the training's. `port` is None for the first free one.
-    If it is `beside_training`, its standard input closes with that.
+    It plays the episode of a seed again and again, at first by the first of the policies, with options of the
+    environment on top of the training's. `port` is None for the first free one. If it is `beside_training`,
+    its standard input closes with that.
     """
     import torch
 
@@ -74,7 +74,7 @@ def show_run(
             if is_over():
                 return
             time.sleep(IDLE_PERIOD)
-        _play(server, Playback(server.gui, recorder, policies, seed, episodes), is_over)
+        _play(server, Playback(server.gui, recorder, policies, seed), is_over)
 
 
 def _play(server: viser.ViserServer, playback: "Playback", is_over: Callable[[], bool]) -> None:
@@ -97,9 +97,8 @@ class Playback:
         recorder: EpisodeRecorder,
         policies: tuple[str, ...],
         seed: int,
-        episodes: int = 1,
     ) -> None:
-        self._recorder, self._first, self._episodes = recorder, seed, episodes
+        self._recorder = recorder
         self._lock = threading.RLock()
         self._position = 0.0  # [steps] in the episode
         self._waited = 0.0  # [s] on its last frame
@@ -168,11 +167,6 @@ class Playback:
         self._waited += period
         if self._waited >= LINGER and episode.frames:
             self._position = self._waited = 0.0
-            if self._episodes > 1:
-                following = int(self._seed.value) + 1
-                is_last = following >= self._first + self._episodes
-                self._seed.value = self._first if is_last else following  # type: ignore[misc]
-                self._start()
 
     def _show(self, episode: RecordedEpisode, index: int) -> None:
         self._slider.max = max(1, episode.length)

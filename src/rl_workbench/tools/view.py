@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     if arguments.beside_training:
         os.nice(NICENESS)
     show_run(
-        arguments.run, tuple(arguments.checkpoint), arguments.seed, 1, env_options(arguments),
+        arguments.run, tuple(arguments.checkpoint), arguments.seed, env_options(arguments),
         host=arguments.host, port=arguments.port, browser=not arguments.no_browser,
         interrupt=interrupt, beside_training=arguments.beside_training,
     )  # fmt: skip

@@ -139,7 +139,7 @@ def test_a_run_without_module_is_plotted(module, trained, tmp_path, capsys, monk
     for name in ("own_arm", "own_arm.tasks"):
         monkeypatch.delitem(sys.modules, name)
     assert cli.main(["plot", str(trained), "--out", str(tmp_path / "curve.png")]) == 0
-    for needs_it in ("eval", "eval --checkpoint=random", "view --no-browser", "enjoy --gui"):
+    for needs_it in ("eval", "eval --checkpoint=random", "view --no-browser", "enjoy"):
         capsys.readouterr()
         assert cli.main([*needs_it.split(), str(trained)]) == 1
         told = capsys.readouterr()

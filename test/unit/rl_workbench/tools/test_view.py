@@ -328,13 +328,6 @@ def test_one_that_comes_after_a_failure_is_shown_at_once(server, paused) -> None
     assert len(shelf.played) == 2 and shelf.shown
 
 
-def test_several_episodes_follow_each_other(server) -> None:
-    shelf = Shelf(length=1)
-    player = Playback(server.gui, shelf, ("best",), seed=7, episodes=3)
-    tick(player, 4 * (0.1 + LINGER + 0.2))
-    assert [seed for _, seed in shelf.played[:4]] == [7, 8, 9, 7]
-
-
 def test_what_is_no_run_is_one_line(tmp_path, run, refused) -> None:
     assert "there is no such folder" in refused("view", tmp_path / "none")
     assert "it has no config.json" in refused("view", tmp_path)
