@@ -5,11 +5,11 @@ import warnings
 from typing import Any
 
 import robot_sim
-from bullet_gazebo.moved import Moved
+from bullet_gazebo.moved import OldNames
 
 __wall_time__ = True  # of its waits, also in a script whose time is simulated
 
-sys.meta_path.insert(0, Moved())
+sys.meta_path.append(OldNames())
 
 
 def __getattr__(name: str) -> Any:
