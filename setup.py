@@ -11,9 +11,7 @@ from xml.etree import ElementTree
 from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
 
-WHEEL = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"][
-    "wheel"
-]
+WHEEL = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
 
 
 class BuildWithData(build_py):

@@ -55,9 +55,7 @@ LOOPS = {
         ("hip", "knee", "ankle"), (120.0, 120.0, 60.0), (3.0, 3.0, 1.0), (-0.45, 0.9, -0.45)
     ),
 }
-HEIGHTS = {
-    "robot_envs/Hopper-v0": -0.05
-}  # [m] of the joint "up" at the begin: the foot is on the ground
+HEIGHTS = {"robot_envs/Hopper-v0": -0.05}  # [m] of the joint "up" at the begin: the foot is on the ground
 
 
 class Rate(NamedTuple):
@@ -115,16 +113,10 @@ def by_hand(identifier: str) -> Callable[[], int]:
     for index, name in enumerate(names):  # PyBullet brakes each joint, unless told otherwise
         pybullet.setJointMotorControl2(body, index, pybullet.VELOCITY_CONTROL, force=0.0, **call)
         start = dict(zip(loop.joints, loop.at, strict=False)).get(name, 0.0)
-        pybullet.resetJointState(
-            body, index, HEIGHTS.get(identifier, 0.0) if name == "up" else start, **call
-        )
+        pybullet.resetJointState(body, index, HEIGHTS.get(identifier, 0.0) if name == "up" else start, **call)
     driven = [names.index(name) for name in loop.joints]
     every = list(range(len(names)))
-    step = (
-        _torques(loop, body, every, driven, call)
-        if loop.at
-        else _positions(body, every, driven, call)
-    )
+    step = _torques(loop, body, every, driven, call) if loop.at else _positions(body, every, driven, call)
 
     def batch() -> int:
         for _ in range(BATCH * ticks):
@@ -156,9 +148,7 @@ def _torques(
     def step() -> None:
         states = pybullet.getJointStates(body, every, **call)
         forces = [k * (at - states[i][0]) - d * states[i][1] for i, k, d, at in gains]
-        pybullet.setJointMotorControlArray(
-            body, driven, pybullet.TORQUE_CONTROL, forces=forces, **call
-        )
+        pybullet.setJointMotorControlArray(body, driven, pybullet.TORQUE_CONTROL, forces=forces, **call)
         pybullet.stepSimulation(**call)
 
     return step
@@ -202,9 +192,7 @@ def figures(taken: dict[str, list[Rate]]) -> dict[str, float]:
             a.processor / b.processor for a, b in zip(here, hand, strict=True)
         ),
         "over ROS": statistics.median(each.wall for each in ros),
-        "over ROS / in-process": statistics.median(
-            a.wall / b.wall for a, b in zip(ros, here, strict=True)
-        ),
+        "over ROS / in-process": statistics.median(a.wall / b.wall for a, b in zip(ros, here, strict=True)),
     }
 
 

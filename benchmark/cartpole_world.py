@@ -18,7 +18,5 @@ def add_cartpole(
     spawned, text = ros_gazebo.gazebo_spawn_urdf_param(
         "robot_description", model_name=name, robot_namespace=namespace, pos_y=pos_y, pos_z=pos_z
     )
-    if not (
-        loaded and spawned and ros_controllers.spawn_controllers_srv(CONTROLLERS, ns=namespace)
-    ):
+    if not (loaded and spawned and ros_controllers.spawn_controllers_srv(CONTROLLERS, ns=namespace)):
         raise SystemExit(f"the robot {name} doesn't come up: {text}")

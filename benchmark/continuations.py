@@ -82,9 +82,7 @@ def in_a_fresh_process(identifier: str, backend: str, path: Path, count: int) ->
         "print('digests', *elsewhere(name, backend, Path(path), False, int(count)))"
     )
     command = [sys.executable, "-c", program, identifier, backend, str(path), str(count)]
-    done = subprocess.run(
-        command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
     return done.stdout.rpartition("digests")[2].split()
 
 
@@ -107,9 +105,7 @@ def main() -> None:
                 size = path.stat().st_size
                 fresh = in_a_fresh_process(identifier, backend, path, count)
                 other = elsewhere(identifier, backend, path, True, count)
-                across = backend in OTHER and elsewhere(
-                    identifier, OTHER[backend], path, False, count
-                )
+                across = backend in OTHER and elsewhere(identifier, OTHER[backend], path, False, count)
             env.close()
             same = [sum(a == b for a, b in zip([*first, *again[1:]], each, strict=True))
                     for each in (again, fresh, other, *([across] if across else []))]  # fmt: skip

@@ -50,9 +50,7 @@ MEASURES: dict[str, Callable[[NewEngine, float], float]] = {
     "energy, 20 s of a swing by 2 rad, of m g l": lambda engine, step: runs.energy_error(
         engine, step, SWING_TIME
     )[0],
-    "drift of its mean, of m g l": lambda engine, step: runs.energy_error(engine, step, SWING_TIME)[
-        1
-    ],
+    "drift of its mean, of m g l": lambda engine, step: runs.energy_error(engine, step, SWING_TIME)[1],
 }
 
 

@@ -86,9 +86,7 @@ def subjects(worlds: int) -> dict[str, Callable[[], int]]:
         "the robot alone": robot_alone(),
         **{identifier: single(identifier) for identifier in IDS},
         "with a noisy, late sensor": single(VECTOR, **noisy),
-        "with random masses and friction": single(
-            VECTOR, randomisation={"mass": 0.2, "cart_friction": 0.5}
-        ),
+        "with random masses and friction": single(VECTOR, randomisation={"mass": 0.2, "cart_friction": 0.5}),
         "with random lengths, too": single(VECTOR, randomisation={"mass": 0.2, "length": 0.1}),
         f"{worlds} worlds": several(worlds),
         f"{worlds} worlds, Gymnasium's async": several(worlds, vectorization_mode="async"),

@@ -161,9 +161,7 @@ def summary(values: list[float]) -> dict[str, float]:
 
 def main() -> None:
     options = reporting.options(__doc__ or "", launches=3, calls=2000)
-    results = {
-        name: summary(values) for name, values in measure(options.launches, options.calls).items()
-    }
+    results = {name: summary(values) for name, values in measure(options.launches, options.calls).items()}
     print(f"{'[ms], the last one a factor':52}{'median':>10}{'p99':>10}{'target':>16}")
     for name, values in results.items():
         target = " / ".join(f"{each:g}" for each in TARGETS[name] if each is not None)

@@ -127,9 +127,7 @@ def main() -> None:
                     f"{engine + ', ' + which:20} {used:14.1f} {took:10.1f} {target:7.0f}",
                     flush=True,
                 )
-    reporting.write(
-        chosen.out, "large_world", {"settings": vars(chosen) | {"out": ""}, "seconds": found}
-    )
+    reporting.write(chosen.out, "large_world", {"settings": vars(chosen) | {"out": ""}, "seconds": found})
 
 
 if __name__ == "__main__":

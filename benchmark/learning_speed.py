@@ -93,9 +93,7 @@ def main() -> None:
         results.setdefault("the environment alone", []).append(bare(chosen.steps))
         for name, options in OPTIONS.items():
             results.setdefault(f"ours, {name}", []).append(ours(options, chosen.steps))
-            results.setdefault(f"Stable-Baselines3, {name}", []).append(
-                theirs(options, chosen.steps)
-            )
+            results.setdefault(f"Stable-Baselines3, {name}", []).append(theirs(options, chosen.steps))
     medians = {name: round(statistics.median(values)) for name, values in results.items()}
     for name, value in medians.items():
         print(f"{value:8d} steps/s  {name}")

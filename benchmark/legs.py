@@ -220,14 +220,10 @@ def main() -> None:
     results: dict[str, Any] = {}
     for run in filter(None, chosen.runs.split(",")):
         rows = results[run] = summary(evaluate(run, chosen.env_backend, chosen.episodes))
-        print(
-            f"{run}\n{'':8} {'succeed':>10} {'fall':>5}   mean error ahead, left [m/s], about [rad/s]"
-        )
+        print(f"{run}\n{'':8} {'succeed':>10} {'fall':>5}   mean error ahead, left [m/s], about [rad/s]")
         for kind, row in rows.items():
             errors = "  ".join(f"{each:.2f}" for each in row["errors"])
-            print(
-                f"{kind:8} {row['successes']:4} of {row['episodes']:3} {row['falls']:5}   {errors}"
-            )
+            print(f"{kind:8} {row['successes']:4} of {row['episodes']:3} {row['falls']:5}   {errors}")
     pairs = {"bullet": bullet_by_hand, "mujoco": mujoco_by_hand}
     for engine, hand in pairs.items():
         batches, taken = (environment(engine), hand()), []

@@ -36,8 +36,7 @@ def table(real: dict[str, Any] | None, runs: list[dict[str, Any]]) -> str:
         by_period[each["dt"]].append(each)
     for period, group in sorted(by_period.items()):
         means = " | ".join(
-            f"{sum(each['mean_lengths'][span] for each in group) / len(group):.0f}"
-            for span in spans
+            f"{sum(each['mean_lengths'][span] for each in group) / len(group):.0f}" for span in spans
         )
         speed = sum(each["steps_per_second"] for each in group) / len(group)
         times = f"{speed / real['steps_per_second']:.1f}" if real else ""

@@ -61,9 +61,7 @@ def by_turns(
     return {name: statistics.median(values[1:]) for name, values in taken.items()}
 
 
-def make_world(
-    urdf: str, robots: int, controllers: Mapping[str, Mapping[str, object]]
-) -> Simulator:
+def make_world(urdf: str, robots: int, controllers: Mapping[str, Mapping[str, object]]) -> Simulator:
     """As in `empty_world.launch`, with so many cart-poles; no one listens."""
     sim = Simulator(World(BulletEngine()), lockstep=True)
     sim.world.spawn("ground_plane", ground_plane(), Pose())
@@ -122,9 +120,7 @@ def over_ros(urdf: str, rounds: int, seconds: float) -> dict[int, dict[str, floa
         with simulator(robots, lockstep=True):
             client = StepClient()
             client.reset({f"robot{i}::cart_pole": LEAN for i in range(robots)})
-            commands = [
-                dict.fromkeys((f"/robot{i}/{CART}" for i in range(robots)), x) for x in (0.0, 0.02)
-            ]
+            commands = [dict.fromkeys((f"/robot{i}/{CART}" for i in range(robots)), x) for x in (0.0, 0.02)]
             calls = 0
 
             def step(ticks: int) -> None:

@@ -56,9 +56,7 @@ def measured(env: gymnasium.vector.VectorEnv[Any, Any, Any], seconds: float) -> 
             env.step(action)
         steps += BATCH * env.num_envs
     client = time.process_time() - client
-    both, kernel = (
-        now - then for now, then in zip(used([os.getpid(), *pids]), before, strict=True)
-    )
+    both, kernel = (now - then for now, then in zip(used([os.getpid(), *pids]), before, strict=True))
     others = used_by_all() - machine - both
     each = 1e6 / steps
     return Measured(
@@ -131,15 +129,11 @@ def report(chosen: Any, taken: dict[int, list[Measured]], told: dict[str, float]
     print(f"{'simulators':20} {'steps/s':>9} {'to one':>7} {'client us':>10} {'simulator us':>13}")
     rows = {}
     for count, values in taken.items():
-        ratio = statistics.median(
-            each.rate / one.rate for each, one in zip(values, taken[1], strict=True)
-        )
+        ratio = statistics.median(each.rate / one.rate for each, one in zip(values, taken[1], strict=True))
         middle = Measured(*map(statistics.median, zip(*values, strict=True)))
         rows[count] = {**middle._asdict(), "to_one": ratio}
         name = str(count) if count else "none: in this process"
-        print(
-            f"{name:20} {middle.rate:9,.0f} {ratio:7.2f} {middle.client:10.1f} {middle.simulator:13.1f}"
-        )
+        print(f"{name:20} {middle.rate:9,.0f} {ratio:7.2f} {middle.client:10.1f} {middle.simulator:13.1f}")
     cores = len(os.sched_getaffinity(0))
     if cores in rows:
         print(f"as many as cores ({cores}): {rows[cores]['to_one']:.2f}, target {TARGET}")

@@ -97,9 +97,7 @@ def in_process(engine: str, cycles: int, urdf: str) -> Iterator[tuple[str, Growt
     env = gymnasium.make("cartpole/Balance-v0", engine=engine, randomisation=RANDOMISATION)
     yield "randomised episodes", growth(episode(env), cycles, here)
     env.close()
-    envs = gymnasium.make_vec(
-        "cartpole/Balance-v0", 4, engine=engine, randomisation=RANDOMISATION, workers=0
-    )
+    envs = gymnasium.make_vec("cartpole/Balance-v0", 4, engine=engine, randomisation=RANDOMISATION, workers=0)
     yield "randomised episodes of 4", growth(episode(envs), cycles // 4, here)
     envs.close()
 
@@ -152,9 +150,7 @@ def measure(cycles: int) -> dict[str, Growths]:
         with Simulation(extra_gazebo_args=f"-e {engine}") as simulation, simulation.active():
             master = rosgraph.Master("/memory", master_uri=simulation.master_uri)
             master.setParam("/robot_description", urdf)
-            ros_params.ros_load_yaml_from_pkg(
-                "cartpole_controller", "joint_position_control.yaml", "/"
-            )
+            ros_params.ros_load_yaml_from_pkg("cartpole_controller", "joint_position_control.yaml", "/")
             for name, grown in over_ros(master, cycles, urdf):
                 found[f"{engine}: {name}"] = tell(f"{engine}: {name}", grown)
     return found

@@ -216,10 +216,7 @@ def environments(seconds: float) -> dict[str, float]:
         "over ROS": environment(NAVIGATE, backend="ros"),
         f"{SIMULATORS} simulators": vector(),
     }
-    return {
-        f"{NAVIGATE}, {name} [steps/s]": rate(batch, seconds).wall
-        for name, batch in batches.items()
-    }
+    return {f"{NAVIGATE}, {name} [steps/s]": rate(batch, seconds).wall for name, batch in batches.items()}
 
 
 def main() -> None:

@@ -55,9 +55,7 @@ def main() -> None:
     for index, count in enumerate(counts):
         results[count] = {
             "steps/s": round(statistics.median(each[index].rate for each in rounds)),
-            "ratio": round(
-                statistics.median(each[index].rate / each[0].rate for each in rounds), 2
-            ),
+            "ratio": round(statistics.median(each[index].rate / each[0].rate for each in rounds), 2),
             "us of processor": round(statistics.median(each[index].cost for each in rounds)),
         }
         print(f"--num-envs {count}: {results[count]}")

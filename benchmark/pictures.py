@@ -120,9 +120,7 @@ def steps(results: dict[str, float], rounds: int, count: int = 200) -> None:
         spent = least(rounds, partial(play, env))
         results[f"{name}, steps a second with 64 x 64 pictures"] = 1e3 * count / spent
         env.close()
-    by_rays, by_gl = (
-        results[f"{each}, steps a second with 64 x 64 pictures"] for each in RENDERERS
-    )
+    by_rays, by_gl = (results[f"{each}, steps a second with 64 x 64 pictures"] for each in RENDERERS)
     results["gl, steps with 64 x 64 pictures over those by rays"] = by_gl / by_rays
 
 

@@ -83,9 +83,7 @@ def digest(returns: list[float]) -> str:
 def picture(results: dict[str, list[list[float]]]) -> Any:
     """Draws the returns of each way's runs over each other."""
     figure = new_figure(10, 3.5)
-    for axes, (way, runs) in zip(
-        figure.subplots(1, len(results), sharey=True), results.items(), strict=True
-    ):
+    for axes, (way, runs) in zip(figure.subplots(1, len(results), sharey=True), results.items(), strict=True):
         same = "the same bits" if runs[0] == runs[1] else "two results"
         axes.plot(runs[0], lw=4, alpha=0.35, label="first run")
         axes.plot(runs[1], lw=1.2, color="tab:red", label="second run, busy")
@@ -102,9 +100,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("script", nargs="?", type=Path, default=EXAMPLE)
     parser.add_argument("--episodes", type=int, default=40)
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/benchmark"), help="folder for JSON and PNG"
-    )
+    parser.add_argument("--out", type=Path, default=Path("runs/benchmark"), help="folder for JSON and PNG")
     chosen = parser.parse_args()
     results: dict[str, list[list[float]]] = {}
     for way, (before, arguments) in WAYS.items():

@@ -56,9 +56,7 @@ def times_real_time(name: str, *arguments: object) -> float:
 
 
 def _run(command: list[str], environment: dict[str, str]) -> float:
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=BOUND, check=True
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=BOUND, check=True)
     found = re.search(r"times real time (\S+)", done.stderr)
     assert found, done.stderr
     return float(found[1])

@@ -148,9 +148,7 @@ def stepper() -> Callable[..., None]:
     """Takes so many ticks of the active simulator."""
     step = ServiceClient("/gazebo/step_world", StepWorld, persistent=True, timeout=120.0)
 
-    def take(
-        ticks: int, controllers: tuple[str, ...] = (), commands: tuple[float, ...] = ()
-    ) -> None:
+    def take(ticks: int, controllers: tuple[str, ...] = (), commands: tuple[float, ...] = ()) -> None:
         for _ in range(0, ticks, 50):
             answer = step(StepWorldRequest(ticks=50, controllers=controllers, commands=commands))
             assert answer.success, answer.status_message

@@ -63,9 +63,7 @@ def main() -> None:
             clock = time.perf_counter if backend == "ros-own" else time.process_time
             env.reset(seed=0)
             env.action_space.seed(0)
-            rounds = [
-                measure(env, clock, chosen.plans, chosen.horizon) for _ in range(chosen.rounds)
-            ]
+            rounds = [measure(env, clock, chosen.plans, chosen.horizon) for _ in range(chosen.rounds)]
             env.close()
             found = [statistics.median(each) for each in zip(*rounds, strict=True)]
             results[f"{identifier}, {backend}"] = dict(zip(COLUMNS, found, strict=True))

@@ -251,9 +251,7 @@ def measure(seconds: float, pairs: int, connects: int) -> dict[str, float]:
         add_cartpole()
         with window(simulation) as (_, address):
             found = compare(lambda: tick_rate(seconds), address, pairs)
-        results["lock-step, with / without"], results["lock-step, ticks a second with a page"] = (
-            found
-        )
+        results["lock-step, with / without"], results["lock-step, ticks a second with a page"] = found
     with Simulation() as simulation, simulation.active():
         add_cartpole()
         process = simulator_process(simulation)

@@ -58,9 +58,7 @@ def face_the_box(env: Any, seed: int) -> None:
 
 
 PROBLEMS = {
-    "cart-pole": Problem(
-        "cartpole/SwingUp-v0", lambda env, seed: env.reset(seed=seed), stands, 5, 16, 16, 2
-    ),
+    "cart-pole": Problem("cartpole/SwingUp-v0", lambda env, seed: env.reset(seed=seed), stands, 5, 16, 16, 2),
     "rover": Problem(
         "robot_envs/Navigate-v0", face_the_box, lambda info, states: info["is_success"], 3, 6, 24, 1
     ),
@@ -95,9 +93,7 @@ def work(pipe: Connection, problem: Problem) -> None:
     env.close()
 
 
-def in_parallel(
-    pipes: Sequence[Connection], snapshot: EnvSnapshot, plans: np.ndarray
-) -> list[float]:
+def in_parallel(pipes: Sequence[Connection], snapshot: EnvSnapshot, plans: np.ndarray) -> list[float]:
     """Returns the return of each plan, which as many processes have tried as there are pipes."""
     data = snapshot.to_bytes()
     for pipe, part in zip(pipes, np.array_split(plans, len(pipes)), strict=True):
@@ -105,9 +101,7 @@ def in_parallel(
     return [each for pipe in pipes for each in pipe.recv()]
 
 
-def planned(
-    env: Any, problem: Problem, seed: int, pipes: Sequence[Connection] = ()
-) -> Iterator[np.ndarray]:
+def planned(env: Any, problem: Problem, seed: int, pipes: Sequence[Connection] = ()) -> Iterator[np.ndarray]:
     """Yields the next action again and again, each time with the environment as it was left."""
     rng = np.random.default_rng(seed)
     best = np.zeros((problem.horizon, *env.action_space.shape), np.float32)
@@ -131,9 +125,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("problem", choices=PROBLEMS)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--backend", help='as "mujoco" or "ros-own"; PyBullet in-process by default'
-    )
+    parser.add_argument("--backend", help='as "mujoco" or "ros-own"; PyBullet in-process by default')
     parser.add_argument("--processes", type=int, default=1, help="that try plans, in-process")
     args = parser.parse_args()
     problem = PROBLEMS[args.problem]

@@ -28,9 +28,7 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 CODE = re.compile(r"`([^`\n]+)`")
-LINK = re.compile(
-    r"!?\[[^\]\[]*(?:\[[^\]]*\][^\]\[]*)*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)"
-)
+LINK = re.compile(r"!?\[[^\]\[]*(?:\[[^\]]*\][^\]\[]*)*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
 HEADING = re.compile(r"^#{1,6} +(.+?)(?: +#+)? *$", re.MULTILINE)
 SCHEME = re.compile(r"^[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 PLACEHOLDER = re.compile(r"[<>*?{}…$]|\.\.\.|\b[A-Z]{2,}\b")

@@ -51,9 +51,7 @@ def parameters() -> str:
         own = [each for key, each in given.declared().items() if key in given.__annotations__]
         rows += [f"| `{each.key}` | {_default(each.default)} | {each.about} |" for each in own]
     head = "| parameter | default | what it is |\n|---|---|---|"
-    return "\n".join(
-        f"{names}:\n\n{head}\n" + "\n".join(rows) + "\n" for names, rows in tables.items()
-    )
+    return "\n".join(f"{names}:\n\n{head}\n" + "\n".join(rows) + "\n" for names, rows in tables.items())
 
 
 def _default(value: object) -> str:
@@ -61,13 +59,7 @@ def _default(value: object) -> str:
         return "required"
     if isinstance(value, bool):
         return str(value).lower()
-    return (
-        f"`{value}`"
-        if isinstance(value, str)
-        else f"{value:g}"
-        if isinstance(value, int | float)
-        else ""
-    )
+    return f"`{value}`" if isinstance(value, str) else f"{value:g}" if isinstance(value, int | float) else ""
 
 
 def _section(section: Section) -> str:
@@ -120,9 +112,7 @@ def _warning(row: Row) -> str:
     return f"unless {' or '.join(values)}"
 
 
-PAGES: dict[
-    str, tuple[str, Callable[[], str]]
-] = {  # what each page's tables are made from, and how
+PAGES: dict[str, tuple[str, Callable[[], str]]] = {  # what each page's tables are made from, and how
     "files.md": ("elements.toml in src/robot_sim/physics/files", elements),
     "controllers.md": ("src/robot_sim/control/controllers", parameters),
 }

@@ -71,13 +71,9 @@ class Drawing:
         for name, model in self._models.items():
             drawn.place(name, dict(zip(model.link_names, model.link_poses(), strict=True)))
         ranges = state.sensors["laser"].ranges
-        points = [
-            r * way if math.isfinite(r) else None for r, way in zip(ranges, self._rays, strict=True)
-        ]
+        points = [r * way if math.isfinite(r) else None for r, way in zip(ranges, self._rays, strict=True)]
         drawn.add("scan", scan_shapes(points))
-        base = dict(
-            zip(self._models["rover"].link_names, self._models["rover"].link_poses(), strict=True)
-        )
+        base = dict(zip(self._models["rover"].link_names, self._models["rover"].link_poses(), strict=True))
         drawn.place("scan", {"scan": base[self._sensor.link].compose(self._sensor.pose)})
         drawn.add("goal", [("goal", GOAL)])
         drawn.place("goal", {"goal": Pose((*self._env.task.goal, 0.01))})
@@ -100,9 +96,7 @@ def main() -> None:
         print(f"seed {seed}: {info}, {len(frames)} frames")
     palette = frames[0].quantize(args.colours, Image.Quantize.MAXCOVERAGE)
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
-    frames[0].save(
-        args.out, save_all=True, append_images=frames[1:], duration=PACE, loop=0, optimize=True
-    )
+    frames[0].save(args.out, save_all=True, append_images=frames[1:], duration=PACE, loop=0, optimize=True)
     print(f"{args.out}: {args.out.stat().st_size} bytes")
 
 

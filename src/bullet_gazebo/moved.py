@@ -11,9 +11,7 @@ PLACES = (("bullet_gazebo.ros", "bullet_gazebo"), ("bullet_gazebo", "robot_sim")
 class OldNames(MetaPathFinder):
     """Finds nothing, and says where modules are that no other finder knows by their names of 0.2."""
 
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> None:
+    def find_spec(self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None) -> None:
         """Raises ModuleNotFoundError for a module that moved; else returns None."""
         for old, new in PLACES:
             place = new + fullname.removeprefix(old)

@@ -165,16 +165,13 @@ def _singles(rows: Iterable[Sequence[float]]) -> np.ndarray:
 def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
     """Converts the visible parts of a model, with its collision shapes if `collisions`."""
     description = model.description
-    seen = visible_model(
-        description, number, model.name, model.link_names, model.joint_names, collisions
-    )
+    seen = visible_model(description, number, model.name, model.link_names, model.joint_names, collisions)
     return SceneModel(
         number=number,
         name=model.name,
         is_static=seen.static,
         links=[
-            SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions))
-            for link in seen.links
+            SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions)) for link in seen.links
         ],
         joints=[_to_joint(joint) for joint in seen.joints],
         root=seen.root,

@@ -44,9 +44,7 @@ class RobotOptions:
     def __post_init__(self) -> None:
         check_options(self)
         if self.backend == "bullet" and (self.realtime or self.rviz):
-            raise WorkbenchError(
-                "--realtime and --rviz need a simulator over ROS: not with --backend bullet"
-            )
+            raise WorkbenchError("--realtime and --rviz need a simulator over ROS: not with --backend bullet")
 
     @property
     def environment(self) -> dict[str, Any]:
@@ -104,9 +102,7 @@ def choose(flags: list[str], parameters: dict[str, Any]) -> tuple[TrainingOption
         parser.error(str(error))
 
 
-def _combined(
-    options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]
-) -> TrainingOptions:
+def _combined(options: TrainingOptions, robot: RobotOptions, given: dict[str, Any]) -> TrainingOptions:
     if robot.headless and options.session.gui:
         raise WorkbenchError("--headless: not with --gui")
     run = options.run
@@ -124,9 +120,7 @@ def _combined(
     if not run.env_id.startswith(f"{NAMESPACE}/"):
         robots = [key for key in [*recorded, "rviz"] if getattr(robot, key) not in _ANYWHERE]
         if robots:
-            raise WorkbenchError(
-                f"{flag(robots[0])} is for the cart-pole: not with --env-id {run.env_id}"
-            )
+            raise WorkbenchError(f"{flag(robots[0])} is for the cart-pole: not with --env-id {run.env_id}")
         return options
     environment = robot.environment
     if "backend" in run.training_environment and not (robot.backend or robot.realtime):
@@ -139,9 +133,7 @@ def _backend(options: TrainingOptions) -> str:
 
 
 @contextlib.contextmanager
-def session(
-    options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions
-) -> Iterator[None]:
+def session(options: TrainingOptions, name: str, argv: list[str], robot: RobotOptions) -> Iterator[None]:
     """Runs the robot's ROS session until the block ends."""
     backend = _backend(options)
     need_ros(f"the backend {backend}")

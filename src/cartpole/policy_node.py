@@ -59,9 +59,7 @@ def main(argv: list[str] | None = None) -> int:
         with interrupt.reading():
             from robot_envs.deployment.policy_node import PolicyNode, run_node
 
-            robot, task, act, period = load(
-                arguments.run, arguments.checkpoint, env_options(arguments)
-            )
+            robot, task, act, period = load(arguments.run, arguments.checkpoint, env_options(arguments))
         interrupt.defer()
         way = arguments.max_speed or math.inf
 
@@ -161,9 +159,7 @@ def load(path: Path, which: str, options: dict[str, Any]) -> Deployed:
                 )
         base = env.unwrapped
         if not isinstance(base, RobotEnv):
-            raise RobotEnvError(
-                f"{path} is a policy of {env_id}, which is not an environment of a robot"
-            )
+            raise RobotEnvError(f"{path} is a policy of {env_id}, which is not an environment of a robot")
         if base.scene.several:
             raise RobotEnvError(f"{path} is a policy of {env_id}, which has several robots")
         return Deployed(base.scene.robots[0], base.task, _of_task(env, act), base.control_period)

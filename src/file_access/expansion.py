@@ -45,9 +45,7 @@ def expand(
     return _ask("xml", os.fspath(path), mappings, limits)
 
 
-def included_files(
-    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None
-) -> list[str]:
+def included_files(path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None) -> list[str]:
     """Returns the files that a xacro file includes, or takes numbers from; raises CannotExpand."""
     return _ask("files", os.fspath(path), mappings, LIMITS).splitlines()
 

@@ -198,9 +198,7 @@ def _lower(kind: int, bound: int) -> None:
 def why_ended(code: int, limits: Limits) -> str:
     """Returns one line on a limited process that has ended with an exit code of `subprocess`."""
     if code == -signal.SIGXCPU:
-        return (
-            f"ended after {limits.processor_time} s of processor time: does it compute without end?"
-        )
+        return f"ended after {limits.processor_time} s of processor time: does it compute without end?"
     if code == -signal.SIGALRM:
         return f"ended after {limits.wall_time:g} s: does it read a pipe, or a drive that is gone?"
     return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"

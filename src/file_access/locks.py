@@ -43,7 +43,5 @@ def is_locked(folder: Path) -> bool:
 @contextmanager
 def scratch_folder(parent: str | None = None) -> Iterator[Path]:
     """Makes a temporary folder for the block."""
-    with tempfile.TemporaryDirectory(
-        prefix="cartpole_", dir=parent, ignore_cleanup_errors=True
-    ) as name:
+    with tempfile.TemporaryDirectory(prefix="cartpole_", dir=parent, ignore_cleanup_errors=True) as name:
         yield Path(name)

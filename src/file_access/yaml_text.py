@@ -119,8 +119,7 @@ def _count(value: Any, known: dict[int, int | None], depth: int) -> int:
         return count
     known[id(value)] = None
     total = 1 + sum(
-        _count(each, known, depth + 1)
-        for each in (value.values() if isinstance(value, dict) else value)
+        _count(each, known, depth + 1) for each in (value.values() if isinstance(value, dict) else value)
     )
     if total > MAX_VALUES:
         raise TooLarge(f"there are more than {MAX_VALUES} values (MAX_VALUES)")

@@ -41,9 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         if is_running() and args.record:
-            tell(
-                "--record: a simulator runs already; record it with: rosbag record /gazebo/journal"
-            )
+            tell("--record: a simulator runs already; record it with: rosbag record /gazebo/journal")
             return USAGE
     except RunsByItself as fault:
         tell(str(fault))
@@ -81,9 +79,7 @@ def _run(args: argparse.Namespace, code: types.CodeType) -> int:
         if threads is not None:
             threads.end_executors()
         others = [
-            each
-            for each in threading.enumerate()
-            if not each.daemon and each is not threading.main_thread()
+            each for each in threading.enumerate() if not each.daemon and each is not threading.main_thread()
         ]
         runner.finish(others)
     finally:
@@ -150,9 +146,7 @@ def _seed(text: str) -> int:
 def _writable(text: str) -> str:
     path = os.path.abspath(text)
     if os.path.isdir(path) or not os.access(os.path.dirname(path), os.W_OK):
-        raise argparse.ArgumentTypeError(
-            f"{text}: a file in a folder that can be written to is needed"
-        )
+        raise argparse.ArgumentTypeError(f"{text}: a file in a folder that can be written to is needed")
     return path
 
 

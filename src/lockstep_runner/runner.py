@@ -263,9 +263,7 @@ WATCH_LOOK = 1.0  # [s]
 
 def watch(runner: ScriptRunner, silence: float = SILENCE) -> threading.Thread:
     """Starts a thread that reports once if no simulated time passes for `silence` [s of wall time]."""
-    thread = threading.Thread(
-        target=_watch, args=(runner, silence), name="lock-step's watchdog", daemon=True
-    )
+    thread = threading.Thread(target=_watch, args=(runner, silence), name="lock-step's watchdog", daemon=True)
     originals.start(thread)
     return thread
 

@@ -124,9 +124,7 @@ WALL_TIME = "__wall_time__"
 
 
 # A wait in these counts as their caller's.
-GO_BETWEENS = frozenset(
-    ["threading", "queue", "concurrent.futures._base", "concurrent.futures.thread"]
-)
+GO_BETWEENS = frozenset(["threading", "queue", "concurrent.futures._base", "concurrent.futures.thread"])
 
 
 class SubmittedCall:

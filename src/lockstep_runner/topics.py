@@ -203,8 +203,7 @@ class Topics:
             if not self.follows(node):
                 tell_once(
                     f"from {node}",
-                    f"node {node} goes by the wall's time: when its messages on {name} come isn't"
-                    " repeatable",
+                    f"node {node} goes by the wall's time: when its messages on {name} come isn't repeatable",
                 )
             return True
         tell_once(
@@ -219,6 +218,5 @@ def _without_simulator(topics: dict[str, Any], names: Iterable[str], attribute: 
     return {
         name
         for name in names
-        if name in topics
-        and all(getattr(each, attribute, None) != NODE for each in topics[name].connections)
+        if name in topics and all(getattr(each, attribute, None) != NODE for each in topics[name].connections)
     }

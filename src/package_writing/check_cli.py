@@ -56,9 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def _check(
-    given: str, arguments: Mapping[str, str], args: argparse.Namespace, pages: list[Findings]
-) -> int:
+def _check(given: str, arguments: Mapping[str, str], args: argparse.Namespace, pages: list[Findings]) -> int:
     """Adds and prints a page for each file that an argument names; returns the exit code."""
     code = parts = 0  # parts of robots: other xacro files include them
     try:

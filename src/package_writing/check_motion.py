@@ -71,9 +71,7 @@ def _of_robot(
     level = max(-1.0, min(1.0, rotate(pose.orientation, up)[2]))
     if not faults and not (level > UPRIGHT and sank < most + SLACK):
         solid = any(each.collisions for each in robot.links.values())
-        faults = [
-            "it falls" if solid else "it has no <collision>, so that it falls through the ground"
-        ]
+        faults = ["it falls" if solid else "it has no <collision>, so that it falls through the ground"]
     text = faults[0] if faults else "held by its fixed base" if robot.fixed_base else "stands"
     if not robot.fixed_base:
         tilt = math.degrees(math.acos(level))

@@ -143,9 +143,7 @@ def _add_served(page: Findings, models: list[ModelDescription], world: list[Plug
     page.lines |= {h: "; ".join(f) for h, f in (("plugins", libraries), ("sensors", sensors)) if f}
 
 
-def _control(
-    page: Findings, text: str, model: ModelDescription, parameters: str | None
-) -> Mapping[str, str]:
+def _control(page: Findings, text: str, model: ModelDescription, parameters: str | None) -> Mapping[str, str]:
     """Adds transmissions and controllers; returns hardware interfaces by joint."""
     plugin = next((each for each in model.plugins if is_control_plugin(each.filename)), None)
     namespace = "" if plugin is None else (plugin.element.findtext("robotNamespace") or "").strip()

@@ -106,9 +106,7 @@ def _write(args: argparse.Namespace, parent: Path) -> str:
             f"{folder} is there already; choose another name, or another place with --to FOLDER"
         )
     if not parent.is_dir():
-        raise CannotWrite(
-            f"there is no folder {parent}; create it, or choose another one with --to FOLDER"
-        )
+        raise CannotWrite(f"there is no folder {parent}; create it, or choose another one with --to FOLDER")
     request = package.PackageRequest(
         args.name, folder, args.urdf, package.read_arguments(args.arguments), args.base, args.height,
         args.interface, tuple(args.passive), args.standalone, args.task == "walk",

@@ -60,9 +60,7 @@ def effort_gains(model: ModelDescription) -> dict[str, Gains]:
     return gains
 
 
-def _stances(
-    model: ModelDescription, below: Mapping[str, float]
-) -> dict[str, tuple[float, float, float]]:
+def _stances(model: ModelDescription, below: Mapping[str, float]) -> dict[str, tuple[float, float, float]]:
     """Returns load, inertia and m g h [N m, kg m², N m/rad] of legs' joints, half the feet on the ground.
 
     The body above a joint is an inverted pendulum, which a p of m g h or less lets fall.

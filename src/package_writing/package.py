@@ -63,15 +63,11 @@ def write(request: PackageRequest, made: Path) -> str:
     """Writes the package into an empty folder; returns the report. Raises CannotWrite if it can't."""
     if request.height is not None and not math.isfinite(request.height):
         raise CannotWrite(f"--height is a number of metres, not {request.height}")
-    copied = copy_urdf(
-        request.urdf or ARM, request.arguments, request.name, made, request.standalone
-    )
+    copied = copy_urdf(request.urdf or ARM, request.arguments, request.name, made, request.standalone)
     if request.standalone:
         request = replace(request, arguments={})
     if not re.fullmatch(r"[\w .+@,=/-]+", copied.place):  # it stands in launch files and in Python
-        raise CannotWrite(
-            f"rename the file {copied.place!r}: letters, digits, blanks and . + @ , = - only"
-        )
+        raise CannotWrite(f"rename the file {copied.place!r}: letters, digits, blanks and . + @ , = - only")
     for name in copied.packages:
         if _package(name) is None:
             raise CannotWrite(
@@ -108,21 +104,15 @@ def write(request: PackageRequest, made: Path) -> str:
     ).rstrip("\n")
 
 
-def _completed(
-    request: PackageRequest, copied: Copied, made: Path, loose: str
-) -> tuple[str, str, Survey]:
+def _completed(request: PackageRequest, copied: Copied, made: Path, loose: str) -> tuple[str, str, Survey]:
     """Writes a file that adds what the robot's own lacks; returns the one to use, its XML and the survey."""
     others = files.resources()
-    resources = Resources(
-        package=lambda name: str(made) if name == request.name else others.package(name)
-    )
+    resources = Resources(package=lambda name: str(made) if name == request.name else others.package(name))
     interface = f"{request.interface.capitalize()}JointInterface" if request.interface else None
     free = request.base == "free"
     control = f"{request.name}_control.urdf.xacro"
     if (made / "urdf" / control).exists():
-        raise CannotWrite(
-            f"the package has a urdf/{control} of its own: rename that file, or the package"
-        )
+        raise CannotWrite(f"the package has a urdf/{control} of its own: rename that file, or the package")
 
     def with_more(survey: Survey | None) -> str:
         text = contents.render(
@@ -177,9 +167,7 @@ def _values(request: PackageRequest, copied: Copied, survey: Survey, urdf: str) 
         raise CannotWrite(
             "--task walk: it has no legs to stand on: it is fixed, or stands on wheels or its base"
         )
-    task, algo = (
-        ("Drive", "sac") if base else ("Walk", "ppo") if request.walks else ("Reach", "ppo")
-    )
+    task, algo = ("Drive", "sac") if base else ("Walk", "ppo") if request.walks else ("Reach", "ppo")
     imus = (each.name for each in model.sensors if each.kind == "imu")
     gains = {True: wheel_gains(model), False: effort_gains(model)}
     return {

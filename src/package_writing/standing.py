@@ -60,24 +60,17 @@ def _stand(
     def wrong(at: np.ndarray) -> np.ndarray:
         poses = link_poses(model, Pose(), {**starts, **dict(zip(turned, at.tolist(), strict=True))})
         here = [
-            poses[foot].compose(flat[foot]).position
-            if foot in flat
-            else _sole(model, foot, poses[foot])[0]
+            poses[foot].compose(flat[foot]).position if foot in flat else _sole(model, foot, poses[foot])[0]
             for foot in on
         ]
         moved = np.array(here) - first
         moved[:, :2] -= centre_of_mass(model, poses)[:2] - first[:, :2].mean(axis=0)
         moved[:, 2] -= moved[:, 2].mean()
-        turns = [
-            multiply(poses[foot].orientation, conjugate(zero[foot].orientation)) for foot in flat
-        ]
+        turns = [multiply(poses[foot].orientation, conjugate(zero[foot].orientation)) for foot in flat]
         return np.concatenate([moved.ravel(), *(2.0 * np.array(each[:3]) for each in turns)])
 
     low, high = np.array(
-        [
-            (each.lower, each.upper) if each.bounded else (-math.inf, math.inf)
-            for each in turned.values()
-        ]
+        [(each.lower, each.upper) if each.bounded else (-math.inf, math.inf) for each in turned.values()]
     ).T
     at = np.zeros(len(turned))
     for _ in range(TURNS):
@@ -119,9 +112,7 @@ def _sole(model: ModelDescription, foot: str, pose: Pose) -> tuple[Vector, float
 def centre_of_mass(model: ModelDescription, poses: Mapping[str, Pose]) -> np.ndarray:
     """Returns the centre of mass (3,) of links at `poses`."""
     bodies = [(model.links[name].inertia, pose) for name, pose in poses.items()]
-    pairs = [
-        (each.mass, pose.compose(each.com).position) for each, pose in bodies if each is not None
-    ]
+    pairs = [(each.mass, pose.compose(each.com).position) for each, pose in bodies if each is not None]
     masses, places = zip(*pairs, strict=True)
     return np.average(np.array(places), axis=0, weights=masses)
 

@@ -21,9 +21,7 @@ from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.urdf import parse_urdf
 from robot_sim.physics.pose import Pose, rotate
 
-EFFORT, POSITION, VELOCITY = (
-    f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity")
-)
+EFFORT, POSITION, VELOCITY = (f"{kind}JointInterface" for kind in ("Effort", "Position", "Velocity"))
 SHARE = 0.6  # of a joint's range, about its middle, from which postures to reach are drawn
 WIDEST = 1.8  # [rad, m], largest half-width of that range
 FARTHEST = 1e6  # [rad, m], of the range's middle
@@ -152,9 +150,7 @@ def root_link(xml: str) -> str:
     links = [link.get("name", "") for link in robot.findall("link")]
     roots = [name for name in links if name not in children]
     if links and not roots:
-        raise CannotWrite(
-            f"links {links[:10]} form a ring: each is a joint's child, so none is the root"
-        )
+        raise CannotWrite(f"links {links[:10]} form a ring: each is a joint's child, so none is the root")
     return roots[0] if roots else ""
 
 
@@ -207,9 +203,7 @@ def _range(joint: JointHandle) -> tuple[float, float]:
         )
     middle, half = (lower + upper) / 2.0, min(SHARE * (upper - lower) / 2.0, WIDEST)
     if not abs(middle) <= FARTHEST:
-        raise CannotWrite(
-            f"joint '{joint.name}' can't move from {lower:g} to {upper:g}: mend its <limit>"
-        )
+        raise CannotWrite(f"joint '{joint.name}' can't move from {lower:g} to {upper:g}: mend its <limit>")
     return _bounds(middle - half, middle + half)
 
 

@@ -65,9 +65,7 @@ def stands_note(feet: Sequence[str], faults: Mapping[str, str]) -> str:
     names = ", ".join(feet)
     if not faults:
         return f"its feet: {names}; without ROS it wasn't tried whether it stands on them"
-    wrong = [
-        f"with {engine}, {fault.removeprefix(FALLS)}" for engine, fault in faults.items() if fault
-    ]
+    wrong = [f"with {engine}, {fault.removeprefix(FALLS)}" for engine, fault in faults.items() if fault]
     if wrong:
         return (
             f"note: it doesn't stand on its feet ({names}): {'; '.join(wrong)}. Change STANCE in robot.py, "

@@ -59,9 +59,7 @@ def copy_urdf(
         raise CannotWrite(f"can't copy {error.filename}: {error.strerror}") from error
     text = "".join(texts.values())
     # What only a false <xacro:if> asks for need not be there.
-    there = {
-        match[1] for match in FOUND.finditer(text) if _is_found(f"{PACKAGE}{match[1]}/package.xml")
-    }
+    there = {match[1] for match in FOUND.finditer(text) if _is_found(f"{PACKAGE}{match[1]}/package.xml")}
     packages = there | set(NAMED.findall(xml))
     outside = [
         each
@@ -100,11 +98,7 @@ def _own(texts: Mapping[Path, str]) -> list[Path]:
     files = list(texts)
     elsewhere = {Path(each[2]).name for text in texts.values() for each in FOUND.finditer(text)}
     near = files[0].resolve().parent.parent  # the package's folder, if the file lies in its `urdf`
-    own = [
-        each
-        for each in files[1:]
-        if each.name not in elsewhere and each.resolve().is_relative_to(near)
-    ]
+    own = [each for each in files[1:] if each.name not in elsewhere and each.resolve().is_relative_to(near)]
     return [files[0], *own]
 
 

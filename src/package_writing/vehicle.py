@@ -70,9 +70,7 @@ def find_base(survey: Survey) -> Base | None:
         return None
     speed = min(SHARE * min(each.fastest for each in wheels) * radii[0], FASTEST)
     separation = 2.0 * float(np.mean(np.abs(places)))
-    base = Base(
-        left, right, rounded(radii[0]), rounded(separation), rounded(speed), survey.model.root
-    )
+    base = Base(left, right, rounded(radii[0]), rounded(separation), rounded(speed), survey.model.root)
     laser, note = _laser(survey)
     touch, clearance = _outline(survey, laser)
     return replace(base, laser=laser, touch=touch, clearance=clearance, note=note)
@@ -83,10 +81,7 @@ def _wheel(survey: Survey, motor: Motor) -> tuple[float, float] | None:
     model, poses = survey.model, link_poses(survey.model, Pose(), {})
     joint = model.joints[motor.joint]
     frame = poses[joint.child].compose(joint.anchor)
-    shapes = [
-        (each, poses[joint.child].compose(each.pose))
-        for each in model.links[joint.child].collisions
-    ]
+    shapes = [(each, poses[joint.child].compose(each.pose)) for each in model.links[joint.child].collisions]
     movers = [each for each in model.carriers(joint.child) if each.movable]
     axis = rotate(frame.orientation, joint.axis)
     along = math.dist(axis, (0.0, 1.0, 0.0)) <= ASKEW

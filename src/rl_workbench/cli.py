@@ -36,9 +36,7 @@ COMMANDS = {
 }
 
 
-def main(
-    argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM
-) -> int:
+def main(argv: list[str] | None = None, prog: str = PROG, program: tuple[str, ...] = training.PROGRAM) -> int:
     """Runs the command line; returns the exit code. `program` starts it, for trainings as processes."""
     words = sys.argv[1:] if argv is None else argv
     if words[:1] == [TRAIN]:  # its flags depend on the algorithm

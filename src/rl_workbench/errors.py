@@ -65,12 +65,8 @@ class Hints:
 
     extras: str = ""  # installs all optional packages; empty if each has to be named
     modules: str = "its folder must be on PYTHONPATH"  # how Python finds a module of the user's own
-    tensorboard: Sequence[str] = field(
-        default_factory=partial(_command, "tensorboard", "tensorboard.main")
-    )
-    workbench: Sequence[str] = field(
-        default_factory=partial(_command, "rl-workbench", "rl_workbench")
-    )
+    tensorboard: Sequence[str] = field(default_factory=partial(_command, "tensorboard", "tensorboard.main"))
+    workbench: Sequence[str] = field(default_factory=partial(_command, "rl-workbench", "rl_workbench"))
 
 
 hints = Hints()

@@ -201,9 +201,7 @@ def _styles(panels: Sequence[Panel]) -> dict[str, dict[str, Any]]:
     }
 
 
-def _draw_seeds(
-    axes: Axes, seeds: Sequence[SeedCurve], label: str, style: Mapping[str, Any]
-) -> None:
+def _draw_seeds(axes: Axes, seeds: Sequence[SeedCurve], label: str, style: Mapping[str, Any]) -> None:
     """Draws every seed thinly, where it ended, the mean over all seeds and its interval."""
     colour = style["color"]
     positions, mean, low, high = mean_over_seeds(seeds)
@@ -213,9 +211,7 @@ def _draw_seeds(
             axes.plot(seed.positions, seed.values, gid="seed", color=colour, lw=0.7, alpha=0.4)
     axes.plot(positions, mean, gid="mean", lw=2, label=label, **style)
     for complete, gid, marker, size in ((True, "ended", "o", 4), (False, "stopped", "x", 6)):
-        ends = [
-            (seed.positions[-1], seed.values[-1]) for seed in seeds if seed.complete == complete
-        ]
+        ends = [(seed.positions[-1], seed.values[-1]) for seed in seeds if seed.complete == complete]
         if ends:
             axes.plot(*np.transpose(ends), marker, gid=gid, color=colour, ms=size, mew=1.5,
                       zorder=3, clip_on=False)  # fmt: skip

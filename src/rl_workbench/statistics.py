@@ -48,9 +48,7 @@ def interval(scores: np.ndarray, statistic: Statistic) -> tuple[float, float]:
     return float(low[0]), float(high[0])
 
 
-def bands(
-    scores: np.ndarray, statistic: Statistic, resamples: int = 1_000
-) -> tuple[np.ndarray, np.ndarray]:
+def bands(scores: np.ndarray, statistic: Statistic, resamples: int = 1_000) -> tuple[np.ndarray, np.ndarray]:
     """Returns percentile bootstrap intervals over the first axis of (N, P), as two arrays (P,)."""
     count = len(scores)
     picked = np.random.default_rng(0).integers(count, size=(resamples, count))

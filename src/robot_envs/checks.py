@@ -68,9 +68,7 @@ def action_reader(space: gymnasium.Space[Any]) -> Callable[[Any], Any]:
 
 def _discrete_reader(space: gymnasium.spaces.Discrete) -> Callable[[Any], int]:
     first, end = int(space.start), int(space.start + space.n)
-    expected = (
-        f"{first} or {end - 1}" if end - first == 2 else f"a whole number from {first} to {end - 1}"
-    )
+    expected = f"{first} or {end - 1}" if end - first == 2 else f"a whole number from {first} to {end - 1}"
 
     def read(action: Any) -> int:
         try:
@@ -121,9 +119,7 @@ def _array_reader(space: gymnasium.spaces.Box, task: str) -> Callable[[Any], np.
         try:
             array = np.asarray(observed, dtype)
         except (TypeError, ValueError) as error:  # no numbers
-            raise TaskError(
-                f"{task}.observe() returned {observed!r}, which isn't of {space}"
-            ) from error
+            raise TaskError(f"{task}.observe() returned {observed!r}, which isn't of {space}") from error
         if array.shape != shape:
             raise TaskError(
                 f"{task}.observe() returned the shape {array.shape}; its observation_space has {shape}"
@@ -199,9 +195,7 @@ def short(given: Any) -> str:
 
 
 def _wrong(task: Task, method: str, given: Any, wanted: str) -> TaskError:
-    return TaskError(
-        f"{type(task).__name__}.{method}() returned {short(given)}; it must be {wanted}"
-    )
+    return TaskError(f"{type(task).__name__}.{method}() returned {short(given)}; it must be {wanted}")
 
 
 def goal_space(task: GoalTask, observations: gymnasium.Space[Any]) -> gymnasium.spaces.Dict:

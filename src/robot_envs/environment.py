@@ -273,9 +273,7 @@ class RobotEnv(SavedEnv):
     def _observe(self, measured: WorldState) -> Any:
         measured = self._shown(measured)
         seen = self._read(self.task.observe(measured))
-        return (
-            seen if self._goal_task is None else checks.with_goals(self._goal_task, seen, measured)
-        )
+        return seen if self._goal_task is None else checks.with_goals(self._goal_task, seen, measured)
 
     def begin_step(self, action: Any) -> None:
         """Sends a step's commands and returns at once, so that several simulators move at the same time.
@@ -356,9 +354,7 @@ class RobotEnv(SavedEnv):
         def read() -> dict[str, Any]:
             assert self._state is not None, "after a reset"
             readings = [(name, self._state.sensors[name].values) for name in names]
-            return {
-                f"{name}.{field}": each for name, all_ in readings for field, each in all_.items()
-            }
+            return {f"{name}.{field}": each for name, all_ in readings for field, each in all_.items()}
 
         return read
 

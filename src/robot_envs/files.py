@@ -57,9 +57,7 @@ def is_text(source: Source) -> bool:
 def locate(source: Source) -> Path:
     """Returns the path of a file, which need not exist; raises RobotEnvError if its package isn't found."""
     if not isinstance(source, (str, Path)) or not str(source).strip():
-        raise RobotEnvError(
-            f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}'
-        )
+        raise RobotEnvError(f'a file is a path or "package://PACKAGE/PLACE", or its text; not {source!r}')
     text = str(source)
     if not text.startswith(PACKAGE):
         return Path(text).expanduser()

@@ -35,9 +35,7 @@ def make_environment(robot: str, task: str, backend: str | None = None, **option
     make_task = named(task)
     is_class = isinstance(make_task, type)
     if not callable(make_task) or (is_class and not issubclass(make_task, Task)):
-        raise RobotEnvError(
-            f"{task} is {short(make_task)}, which is not a subclass of robot_envs.Task"
-        )
+        raise RobotEnvError(f"{task} is {short(make_task)}, which is not a subclass of robot_envs.Task")
     known = option_names(RobotEnv)
     own = {name: value for name, value in options.items() if name in known}
     others = {name: value for name, value in options.items() if name not in known}
@@ -55,9 +53,7 @@ def make_vector(num_envs: int, **options: Any) -> RobotVectorEnv:
 
 def _robots(name: str) -> Any:
     attribute = named(name)
-    robots = (
-        attribute() if _takes_nothing(attribute) and not isinstance(attribute, type) else attribute
-    )
+    robots = attribute() if _takes_nothing(attribute) and not isinstance(attribute, type) else attribute
     listed = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(listed, (list, tuple)) or not all(isinstance(each, Robot) for each in listed):
         raise RobotEnvError(

@@ -172,9 +172,7 @@ class Robot:
                 yield f"{what} lists names: ({names!r},) and not {names!r}"
                 return
         if not self.joints:
-            yield (
-                "its URDF has no <transmission>: each joint that is to be commanded or seen needs one"
-            )
+            yield ("its URDF has no <transmission>: each joint that is to be commanded or seen needs one")
             return
         self._warn_of_unknown_joints()
         try:
@@ -183,9 +181,7 @@ class Robot:
             yield str(error)
         else:
             passive = [each.name for each in self.links.movable_joints]
-            yield from controllers.faults(
-                self.run, self.commanded, self.parameters, hardware, passive
-            )
+            yield from controllers.faults(self.run, self.commanded, self.parameters, hardware, passive)
 
     def _world_faults(self) -> Iterator[str]:
         """Yields the faults of control period, world and namespace."""
@@ -229,9 +225,7 @@ class Robot:
             for name in named if isinstance(named, Mapping) else ():
                 if name not in self.control.joints:
                     near = did_you_mean(str(name), self.control.joints)
-                    text = (
-                        f"the robot '{self.model}' has no joint '{name}', which {what} names{near}"
-                    )
+                    text = f"the robot '{self.model}' has no joint '{name}', which {what} names{near}"
                     logger.warning("%s", text)
 
     @cached_property

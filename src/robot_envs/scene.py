@@ -75,9 +75,7 @@ class Scene:
     def ports(self) -> dict[str, tuple[Robot, CommandPort]]:
         """The ports of controllers, by their names in commands."""
         return {
-            self.controller(robot, port.name): (robot, port)
-            for robot in self.robots
-            for port in robot.ports
+            self.controller(robot, port.name): (robot, port) for robot in self.robots for port in robot.ports
         }
 
     def starting_commands(self, joints: Mapping[str, JointState]) -> dict[str, Any]:
@@ -86,9 +84,7 @@ class Scene:
         commands = {}
         for name, (robot, port) in self.ports.items():
             held = port.joints if port.holds else ()
-            commands[name] = port.at_start(
-                {each: positions[self.joint(robot, each)] for each in held}
-            )
+            commands[name] = port.at_start({each: positions[self.joint(robot, each)] for each in held})
         return commands
 
     def commands(self, given: Commands) -> dict[str, float | tuple[float, ...]]:
@@ -133,9 +129,7 @@ class Scene:
     def _close_loops(self, robot: Robot, placed: Placed, initial: InitialState) -> None:
         """Puts the joints of closed loops that an episode doesn't place where these close."""
         joints = {self.joint(robot, each.name): each for each in robot.links.movable_joints}
-        goals = {
-            j.name: j.clamped(placed[at][0]) for at, j in joints.items() if at in initial.joints
-        }
+        goals = {j.name: j.clamped(placed[at][0]) for at, j in joints.items() if at in initial.joints}
         rest = {joint.name: (0.0, placed[at][1]) for at, joint in joints.items()}
         states = closed(robot.links, rest, goals)
         if states is None:

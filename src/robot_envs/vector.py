@@ -115,9 +115,7 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
             raise ValueError(f"{len(read)} actions for {self.num_envs} environments")
         self._interrupted = True
         if self._side_by_side:
-            for robot, action, ended in zip(
-                self._robots, read, self._autoreset_envs.tolist(), strict=True
-            ):
+            for robot, action, ended in zip(self._robots, read, self._autoreset_envs.tolist(), strict=True):
                 if not ended or self.autoreset_mode is AutoresetMode.SAME_STEP:
                     robot.begin_step(action)
         given = super().step(actions)

@@ -59,9 +59,7 @@ class AppliedForces:
 
     def clear_wrenches(self, body: str) -> None:
         """Drops all wrenches on the link of that scoped name."""
-        self.wrenches = [
-            each for each in self.wrenches if f"{each.model.name}::{each.link}" != body
-        ]
+        self.wrenches = [each for each in self.wrenches if f"{each.model.name}::{each.link}" != body]
 
     def forget(self, model: Model) -> None:
         """Drops a model's efforts and wrenches; as in Gazebo, other models' joints of the same name too."""

@@ -63,9 +63,7 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
         there = sorted(map(str, models)) if isinstance(models, dict) else models
         return f"the snapshot has the models {there!r:.300}, and here are {sorted(own)}"
     if others := [name for name in own if models[name] != own[name]]:
-        return (
-            f"the model '{others[0]}' has another description or initial pose than in the snapshot"
-        )
+        return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
     if given.get("robots") != here["robots"]:
         return (
             "the controllers that run aren't those of the snapshot: "
@@ -102,17 +100,11 @@ def check_foreign(
         raise SnapshotError(found)
 
 
-def _known(
-    robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, Any]
-) -> dict[str, Any]:
+def _known(robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a robot's state without controllers that only publish and that the other one lacks."""
     claiming = {each.name for each in robot.manager.running if any(each.claims.values())}
     manager, there = own["manager"], given["manager"]["controllers"]
-    kept = {
-        name: each
-        for name, each in manager["controllers"].items()
-        if name in claiming or name in there
-    }
+    kept = {name: each for name, each in manager["controllers"].items() if name in claiming or name in there}
     return {**own, "manager": {**manager, "controllers": kept}}
 
 

@@ -131,9 +131,7 @@ class GripRule(NamedTuple):
 class GraspHold(Stateful):
     """Fixes an object to the palm while fingers press on it from opposing sides."""
 
-    def __init__(
-        self, world: World, model: Model, palm: str, fingers: Sequence[str], rule: GripRule
-    ) -> None:
+    def __init__(self, world: World, model: Model, palm: str, fingers: Sequence[str], rule: GripRule) -> None:
         self._world, self._model, self._palm = world, model, palm
         self._fingers, self._rule = tuple(fingers), rule
         self._counts: dict[tuple[Model, str], int] = {}
@@ -164,9 +162,7 @@ class GraspHold(Stateful):
 
     def look(self, now: int) -> None:
         """Looks at the contacts of the last step; called at its rate."""
-        self._held = {
-            key: held for key, held in self._held.items() if held[0] in self._world.attachments
-        }
+        self._held = {key: held for key, held in self._held.items() if held[0] in self._world.attachments}
         for key in [key for key, (_, places) in self._held.items() if self._opened(key, places)]:
             self._world.detach(self._held.pop(key)[0])
             self._counts.pop(key, None)

@@ -250,9 +250,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     is_held = exactly and isinstance(there, Held)
     if there is None or (given is None and not (is_held or _refers(there))):
         return ""
-    there, given = (
-        each.item() if isinstance(each, np.generic) else each for each in (there, given)
-    )
+    there, given = (each.item() if isinstance(each, np.generic) else each for each in (there, given))
     numbers = (int, float)
     if type(there) in numbers and type(given) in numbers:
         is_number = math.isfinite(given) if isinstance(there, int) else True
@@ -267,9 +265,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         if there.dtype != given.dtype or sizes[0] != sizes[1]:
             return f"{place} is an array of {given.dtype}{list(given.shape)}"
     if exactly and isinstance(there, (dict, list, tuple)):
-        keys, others = (
-            each if isinstance(each, dict) else range(len(each)) for each in (there, given)
-        )
+        keys, others = (each if isinstance(each, dict) else range(len(each)) for each in (there, given))
         if set(keys) != set(others):
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
     entries = there.items() if isinstance(there, dict) else ()
@@ -287,10 +283,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     elif hasattr(there, "__dataclass_fields__"):
         names = fields_of(type(there))
         pairs = ((name, getattr(there, name), getattr(given, name)) for name in names)
-    found = (
-        misfit(one, other, f"{place}/{key}".lstrip("/"), exactly=exactly)
-        for key, one, other in pairs
-    )
+    found = (misfit(one, other, f"{place}/{key}".lstrip("/"), exactly=exactly) for key, one, other in pairs)
     return next(filter(None, found), "")
 
 

@@ -72,9 +72,7 @@ class ControlledRobot:
         indices = {name: index for index, name in enumerate(model.joint_names)}
         missing = sorted(set(hardware.joints) - set(indices))
         if missing:
-            raise ControlError(
-                f"model '{model.name}' has no joint {missing}, which a transmission names"
-            )
+            raise ControlError(f"model '{model.name}' has no joint {missing}, which a transmission names")
         self._joints = [(joint, indices[name]) for name, joint in hardware.joints.items()]
         self._effort_joints = [(j, enforce, indices[j.name]) for j, enforce in hardware.enforcers]
         self._drives = [(drive, indices[drive.joint.name]) for drive in hardware.drives]
@@ -100,9 +98,7 @@ class ControlledRobot:
         self.watch.review(self._control_period / NANOSECONDS)
         shares = self.watch.shares
         self._softened = [
-            (joint, shares[joint.name])
-            for joint in self.hardware.effort_joints
-            if joint.name in shares
+            (joint, shares[joint.name]) for joint in self.hardware.effort_joints if joint.name in shares
         ]
         for drive in self.hardware.drives:
             drive.share = shares.get(drive.joint.name, 1.0)

@@ -140,11 +140,7 @@ class Simulator(Shared):
         due = pacer.wait(1.0 / rate if rate > 0.0 else 0.0, IDLE_POLL)
         while not due:
             due = pacer.wait_on(IDLE_POLL)
-            if (
-                rate != self.max_update_rate
-                or self._stopping.is_set()
-                or not self._flowing.is_set()
-            ):
+            if rate != self.max_update_rate or self._stopping.is_set() or not self._flowing.is_set():
                 pacer.restart()
                 return
 
@@ -159,9 +155,7 @@ class Simulator(Shared):
         runs by itself, ValueError for less than one tick.
         """
         if not self.lockstep:
-            raise NotInLockstep(
-                "the world runs in real time; start it with lockstep:=true to step it"
-            )
+            raise NotInLockstep("the world runs in real time; start it with lockstep:=true to step it")
         if ticks < 1:
             raise ValueError(f"ticks is {ticks}: at least 1 is needed")
         for prepare in self.before_advance:

@@ -47,9 +47,7 @@ class StabilityWatch(Stateful):
 
     non_persistent = ("_manager", "_log", "_logged", "shares")
 
-    def __init__(
-        self, model: Model, hardware: RobotHardware, manager: ControllerManager, log: Log
-    ) -> None:
+    def __init__(self, model: Model, hardware: RobotHardware, manager: ControllerManager, log: Log) -> None:
         """
         Raises:
             ControlError: If the model's `<pOnlyDamping>` isn't a number from 0 to 1.
@@ -129,9 +127,7 @@ class StabilityWatch(Stateful):
                     break
         self._pushing = pushing
 
-    def _stops(
-        self, joint: str, how: str, contacts: Sequence[Contact]
-    ) -> Iterator[tuple[bool, str]]:
+    def _stops(self, joint: str, how: str, contacts: Sequence[Contact]) -> Iterator[tuple[bool, str]]:
         """Yields for each contact that stops a joint whether it is of two links of the model, and a text."""
         model = self._model
         carried = {link for link in model.link_names if joint in model.carriers(link)}
@@ -186,9 +182,7 @@ class StabilityWatch(Stateful):
         self._model.add_damping(added)
 
 
-def too_high(
-    model: Model, loops: list[OwnedLoop], dt: float
-) -> list[tuple[OwnedLoop, float, float]]:
+def too_high(model: Model, loops: list[OwnedLoop], dt: float) -> list[tuple[OwnedLoop, float, float]]:
     """Returns the loops whose gains are too high for steps of `dt` [s], the worst first.
 
     Each comes with the factor by which it is too high, and the share of its effort to take. Inertias are

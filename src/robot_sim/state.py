@@ -158,8 +158,7 @@ def find_collisions(world: World, name: str) -> set[Collision]:
                     found.add((model.name, link, collision))
     if len({model for model, *_ in found}) > 1:
         raise UnknownName(
-            f"several models have a link or collision '{name}'; write model::link or "
-            "model::link::collision"
+            f"several models have a link or collision '{name}'; write model::link or model::link::collision"
         )
     if not found:
         raise UnknownName(_why_none(world, name))

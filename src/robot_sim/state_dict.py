@@ -254,9 +254,7 @@ def _saved(value: Any) -> Any:
         names = fields_of(kind)
         held = {name: getattr(value, name) for name in names if hasattr(value, name)}
         if len(held) < len(names) or not held.keys() >= getattr(value, "__dict__", {}).keys():
-            raise _Unknown(
-                f"a {kind.__module__}.{kind.__qualname__} whose attributes aren't its fields"
-            )
+            raise _Unknown(f"a {kind.__module__}.{kind.__qualname__} whose attributes aren't its fields")
         if kind.__dataclass_params__.frozen and ATOMS.issuperset(map(type, held.values())):
             return value
         made = copy.copy(value)
@@ -365,9 +363,7 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
         target = current if isinstance(current, random.Random) else random.Random()
         target.setstate(state)
         return target
-    is_same = isinstance(current, np.random.Generator) and (
-        type(current.bit_generator).__name__ == kind
-    )
+    is_same = isinstance(current, np.random.Generator) and (type(current.bit_generator).__name__ == kind)
     target = current if is_same else np.random.Generator(getattr(np.random, kind)())
     bits: Any = target.bit_generator
     seeds = saved["seeds"]

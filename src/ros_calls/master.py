@@ -117,8 +117,7 @@ def require(timeout: float = TIMEOUT) -> None:
         call("getPid", timeout=timeout)
     except (NoAnswer, Refused) as fault:
         down = MasterDown(
-            f"no ROS master at {uri()} ({fault}): start roscore or launch a simulator,"
-            " or mend ROS_MASTER_URI"
+            f"no ROS master at {uri()} ({fault}): start roscore or launch a simulator, or mend ROS_MASTER_URI"
         )
         down.port_is_free = isinstance(fault, NobodyListens)
         raise down from fault
@@ -160,20 +159,14 @@ def host_and_port() -> tuple[str, int]:
     except ValueError:
         host = port = None
     if not host or not port:
-        raise MasterDown(
-            f"ROS_MASTER_URI is {uri()!r}: expected something like http://localhost:11311"
-        )
+        raise MasterDown(f"ROS_MASTER_URI is {uri()!r}: expected something like http://localhost:11311")
     return host, port
 
 
 @functools.cache  # the look-up may ask a name server
 def host_is_local(host: str) -> bool:
     """Returns True if any name of this machine matches the host."""
-    return (
-        host == "localhost"
-        or host.startswith("127.")
-        or bool(rosgraph.network.is_local_address(host))
-    )
+    return host == "localhost" or host.startswith("127.") or bool(rosgraph.network.is_local_address(host))
 
 
 def is_at(address: str) -> bool:

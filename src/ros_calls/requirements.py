@@ -54,10 +54,7 @@ def lack(modules: tuple[str, ...]) -> str:
 
 def _is_managed() -> bool:
     """Returns whether pip refuses to install into the system's Python (PEP 668)."""
-    return (
-        sys.prefix == sys.base_prefix
-        and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
-    )
+    return sys.prefix == sys.base_prefix and Path(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED").exists()
 
 
 def _file() -> Path:

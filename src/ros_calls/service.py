@@ -66,9 +66,7 @@ class ServiceClient:
             until the caller's node shuts down. The attribute may be changed.
     """
 
-    def __init__(
-        self, name: str, kind: Any, persistent: bool = False, timeout: float = TIMEOUT
-    ) -> None:
+    def __init__(self, name: str, kind: Any, persistent: bool = False, timeout: float = TIMEOUT) -> None:
         self.name = str(rospy.resolve_name(name))
         self._kind = kind
         self._persistent = persistent

@@ -66,18 +66,14 @@ def _until_ok(
     except ServiceFailed as fault:
         _log.error(f"{service} ({what}): {fault}")
         return False
-    _log.error(
-        f"{service} ({what}): refused {max_retries} times; the controller manager's log says why"
-    )
+    _log.error(f"{service} ({what}): refused {max_retries} times; the controller manager's log says why")
     return False
 
 
 def _each(
     load: Callable[..., bool], names: Sequence[str], ns: str | None, retries: int, timeout: float
 ) -> ListResult:
-    return ListResult(
-        [name for name in names if not load(name, ns, retries, service_timeout=timeout)]
-    )
+    return ListResult([name for name in names if not load(name, ns, retries, service_timeout=timeout)])
 
 
 def load_controller_srv(
@@ -89,8 +85,7 @@ def load_controller_srv(
     Returns True once the manager has loaded it. False if it refuses (already loaded, no parameters, unknown
     type or joint) or doesn't answer.
     """
-    request = (controller_name,)
-    return _until_ok(LoadController, request, controller_name, ns, max_retries, service_timeout)
+    return _until_ok(LoadController, (controller_name,), controller_name, ns, max_retries, service_timeout)
 
 
 def load_controller_list_srv(
@@ -112,8 +107,7 @@ def unload_controller_srv(
 
     Returns True once it is unloaded. False if it runs, is unknown, or the manager doesn't answer.
     """
-    request = (controller_name,)
-    return _until_ok(UnloadController, request, controller_name, ns, max_retries, service_timeout)
+    return _until_ok(UnloadController, (controller_name,), controller_name, ns, max_retries, service_timeout)
 
 
 def unload_controller_list_srv(
@@ -202,9 +196,7 @@ def spawn_controllers_srv(
         return False
     missing = [name for name in spawn_controllers if name not in known]
     failed = load_controller_list_srv(missing, ns, service_timeout=service_timeout).failed
-    to_start = [
-        name for name in spawn_controllers if name not in failed and known.get(name) != "running"
-    ]
+    to_start = [name for name in spawn_controllers if name not in failed and known.get(name) != "running"]
     started = not to_start or start_controllers_srv(
         to_start, ns, strictness, start_asap, timeout, service_timeout=service_timeout
     )
@@ -225,9 +217,7 @@ def kill_controllers_srv(
     ) and bool(unload_controller_list_srv(kill_controllers, ns, service_timeout=service_timeout))
 
 
-def list_controllers_srv(
-    ns: str | None = None, *, service_timeout: float = TIMEOUT
-) -> dict[str, str] | None:
+def list_controllers_srv(ns: str | None = None, *, service_timeout: float = TIMEOUT) -> dict[str, str] | None:
     """Returns the loaded controllers' states (initialized, running, stopped) by name.
 
     None, with an error in the log, if the manager doesn't answer.
@@ -236,9 +226,7 @@ def list_controllers_srv(
     return answer and {controller.name: controller.state for controller in answer.controller}
 
 
-def list_controller_types_srv(
-    ns: str | None = None, *, service_timeout: float = TIMEOUT
-) -> list[str] | None:
+def list_controller_types_srv(ns: str | None = None, *, service_timeout: float = TIMEOUT) -> list[str] | None:
     """Returns the controller types that can be loaded, or None. See `list_controllers_srv`."""
     answer = _listed(ns, "list_controller_types", ListControllerTypes, service_timeout)
     return answer and list(answer.types)

@@ -71,9 +71,7 @@ def ros_launch_from_path(
             return False
         if not wait:
             return Started(handle)
-        return await_start(
-            handle, lambda: _roslaunch.await_nodes(handle), "nothing runs", timeout, ready
-        )
+        return await_start(handle, lambda: _roslaunch.await_nodes(handle), "nothing runs", timeout, ready)
 
 
 def ros_kill_launch_process() -> bool:

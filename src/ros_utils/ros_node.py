@@ -136,8 +136,7 @@ def _shut_down(nodes: dict[str, str]) -> bool:
     left = _nodes.shut_down_nodes(nodes)
     if left:
         _log.warn(
-            f"still registered at {_master.uri()}: {', '.join(left)}"
-            " (rosnode cleanup removes dead ones)"
+            f"still registered at {_master.uri()}: {', '.join(left)} (rosnode cleanup removes dead ones)"
         )
     return not left
 
@@ -163,7 +162,5 @@ def _global(ns: str | None) -> str:
 
 def _remappings(name: str | None, ns: str | None) -> list[str]:
     if name is not None and not rosgraph.names.is_legal_base_name(name):
-        raise ValueError(
-            f"name {name!r}: a node's name has letters, digits and underscores, and no slash"
-        )
+        raise ValueError(f"name {name!r}: a node's name has letters, digits and underscores, and no slash")
     return [*([f"__name:={name}"] if name else []), f"__ns:={_global(ns)}"]

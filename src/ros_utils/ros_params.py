@@ -59,7 +59,5 @@ def _read(path: str) -> list[dict[str, Any]]:
         raise FileError("no parameters in it")
     for document in documents:
         if document.pop(rosparam.NS, None) is not None:
-            _log.warn(
-                f"{path}: its {rosparam.NS} is ignored: the namespace is an argument of the call"
-            )
+            _log.warn(f"{path}: its {rosparam.NS} is ignored: the namespace is an argument of the call")
     return documents

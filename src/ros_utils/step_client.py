@@ -89,9 +89,7 @@ class PreparedSteps:
         parent = service.rpartition("/")[0]
         self._timeout = timeout
         self._prepare = client(f"{parent}/prepare_step", PrepareStep, timeout=timeout)
-        self._step = client(
-            f"{parent}/prepared_step", PreparedStep, persistent=True, timeout=timeout
-        )
+        self._step = client(f"{parent}/prepared_step", PreparedStep, persistent=True, timeout=timeout)
         self._prepared: dict[StepNames, PrepareStepResponse] = {}
         self._begun = StepNames(), PreparedStepRequest()
 
@@ -304,9 +302,7 @@ def _response(answer: StepAnswer) -> StepWorldResponse:
     numbers, joints, models = answer.numbers, len(answer.joints), len(answer.models)
     rest = range(3 * joints, len(numbers), MOTION)
     poses = [Pose(Point(*numbers[i : i + 3]), Quaternion(*numbers[i + 3 : i + 7])) for i in rest]
-    twists = [
-        Twist(Vector3(*numbers[i + 7 : i + 10]), Vector3(*numbers[i + 10 : i + 13])) for i in rest
-    ]
+    twists = [Twist(Vector3(*numbers[i + 7 : i + 10]), Vector3(*numbers[i + 10 : i + 13])) for i in rest]
     states = JointState(
         Header(0, genpy.Time(*divmod(answer.now, 1_000_000_000)), ""),
         list(answer.joints),

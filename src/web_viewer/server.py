@@ -282,9 +282,7 @@ class ServedPage:
             raise PortInUse(f"another process has just taken port {port}; start again")
         _check_fields(self.server)
         self.server.gui.main_panel.dock_right()
-        self.server.gui.configure_theme(
-            control_width="medium", show_logo=False, show_share_button=False
-        )
+        self.server.gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self.server.initial_camera.position = camera
         self.server.initial_camera.look_at = look_at
 

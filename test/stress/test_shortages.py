@@ -72,9 +72,7 @@ def size_of(run: Path) -> int:
         pytest.param("memory", resource.RLIMIT_AS, lambda d: d.randrange(MEMORY), marks=full),
     ],
 )  # fmt: skip
-def test_low_limits(
-    scenario: Scenario, whole, tmp_path: Path, what: str, limit: int, draw: Callable
-) -> None:
+def test_low_limits(scenario: Scenario, whole, tmp_path: Path, what: str, limit: int, draw: Callable) -> None:
     unharmed = {name: whole(name) for name in NAMES}
 
     def case(number: int, dice: random.Random) -> None:

@@ -171,9 +171,7 @@ def schema_paths(version: str) -> tuple[dict[tuple[str, str], str], list[str]]:
     found: dict[tuple[str, str], str] = {}
     missing: list[str] = []
     known: set[tuple[str, int]] = set()
-    files = {
-        each.name: ElementTree.parse(each).getroot() for each in (SCHEMAS / version).glob("*.sdf")
-    }
+    files = {each.name: ElementTree.parse(each).getroot() for each in (SCHEMAS / version).glob("*.sdf")}
 
     def children(element: Element) -> Iterator[tuple[str, Element]]:
         refers = element.get("ref")

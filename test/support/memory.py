@@ -39,6 +39,4 @@ def stays(action: Callable[[int], None], cycles: int, warm_up: int, most: int) -
     What is kept of each call is kept in each round. What comes once is not: a thread of another test, pages
     that the allocator gives back late.
     """
-    return any(
-        growth(action, cycles, warm_up if number == 0 else 0) < most for number in range(ROUNDS)
-    )
+    return any(growth(action, cycles, warm_up if number == 0 else 0) < most for number in range(ROUNDS))

@@ -40,9 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             rospy.logwarn("Arguments without effect here: %s", " ".join(options.ignored))
         missing = lack(WINDOW)
         if missing:
-            rospy.logwarn(
-                "gazebo_gui: no window; the simulation continues without one. %s", missing
-            )
+            rospy.logwarn("gazebo_gui: no window; the simulation continues without one. %s", missing)
             return 0
         window = importlib.import_module("bullet_gazebo.window.window")  # with viser, trimesh
         try:

@@ -86,9 +86,7 @@ def group_main(argv: Sequence[str] | None = None) -> int:
     command = commands.add_parser("spawn", help="load and start the controllers of a group")
     command.set_defaults(act=lambda options: _spawn(_read_groups(), options.group))
     command.add_argument("group", metavar="GROUP")
-    text = (
-        "stop the other groups' running controllers, and start those of a group, loaded if need be"
-    )
+    text = "stop the other groups' running controllers, and start those of a group, loaded if need be"
     command = commands.add_parser("switch", help=text)
     command.set_defaults(act=lambda options: _switch_to(_read_groups(), options.group))
     command.add_argument("group", metavar="GROUP")
@@ -146,9 +144,7 @@ def _read_groups() -> Groups:
 
 def _group(groups: Groups, name: str) -> list[str]:
     if name not in groups:
-        raise CommandFailed(
-            f"no group '{name}' in {rospy.resolve_name(PARAMETER)}: {sorted(groups)}"
-        )
+        raise CommandFailed(f"no group '{name}' in {rospy.resolve_name(PARAMETER)}: {sorted(groups)}")
     return groups[name]
 
 

@@ -37,9 +37,7 @@ class ShownJoints:
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self._joints = joints
-        self._ask = ServiceClient(
-            "/gazebo/get_joint_properties", GetJointProperties, persistent=True
-        )
+        self._ask = ServiceClient("/gazebo/get_joint_properties", GetJointProperties, persistent=True)
         self._newest: JointState | None = None
         self._news = threading.Event()
         self._publisher = rospy.Publisher("~joint_states", JointState, queue_size=1, latch=True)

@@ -76,12 +76,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     source.add_argument("-stdin", action="store_true", help="read it from standard input")
     parser.add_argument("-model", required=True, metavar="NAME", help="name of the new model")
     parser.add_argument("-reference_frame", default="", help="model or link of the pose")
-    parser.add_argument(
-        "-gazebo_namespace", default="/gazebo", help="namespace of the simulator's services"
-    )
-    parser.add_argument(
-        "-robot_namespace", help="namespace of the model's plugins (default: the node's)"
-    )
+    parser.add_argument("-gazebo_namespace", default="/gazebo", help="namespace of the simulator's services")
+    parser.add_argument("-robot_namespace", help="namespace of the model's plugins (default: the node's)")
     parser.add_argument("-unpause", action="store_true", help="unpause the world afterwards")
     parser.add_argument("-wait", metavar="MODEL", help="wait for another model first")
     for name, what in zip("xyzRPY", ("[m]",) * 3 + ("[rad]",) * 3, strict=True):
@@ -92,9 +88,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("-package_to_model", action="store_true",
                         help="meshes: model:// instead of package://")  # fmt: skip
-    parser.add_argument(
-        "-b", dest="bond", action="store_true", help="stay, and delete the model at the end"
-    )
+    parser.add_argument("-b", dest="bond", action="store_true", help="stay, and delete the model at the end")
     options = parser.parse_args([_not_an_option(argument) for argument in arguments])
     options.joints = [(name, _position(parser, text)) for name, text in options.joints]
     return options

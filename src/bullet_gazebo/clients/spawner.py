@@ -42,9 +42,7 @@ class ManagerClient:
     def __init__(self, namespace: str = "", user: str = "Controller Spawner") -> None:
         """`user` names the waiting program in the log."""
         self._user = user
-        self._prefix = (
-            f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
-        )
+        self._prefix = f"{namespace.rstrip('/')}/controller_manager" if namespace else "controller_manager"
 
     def wait(self, services: Sequence[str], timeout: float) -> str | None:
         """Waits for the manager's services, each at most `timeout` [s of wall time], or infinity.
@@ -69,9 +67,7 @@ class ManagerClient:
     ) -> bool:
         """Starts and stops controllers in one step; no time limit for the manager itself."""
         request = (list(start), list(stop), strictness, False, 0.0)
-        return bool(
-            self._call("switch_controller", srv.SwitchController, *request, timeout=timeout).ok
-        )
+        return bool(self._call("switch_controller", srv.SwitchController, *request, timeout=timeout).ok)
 
     def running(self, timeout: float = math.inf) -> list[str]:
         """Returns the names of the running controllers."""
@@ -104,8 +100,7 @@ def _work(manager: ManagerClient, options: argparse.Namespace) -> int:
     missing = _find(manager, options.timeout)
     if missing:
         rospy.logwarn(
-            "Controller Spawner couldn't find the expected controller_manager ROS interface:"
-            " no service %s",
+            "Controller Spawner couldn't find the expected controller_manager ROS interface: no service %s",
             missing,
         )
         return 1
@@ -139,9 +134,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--stopped", action="store_true", help="load, but don't start")
     parser.add_argument("--wait-for", metavar="TOPIC", help="first wait for true on a Bool topic")
     parser.add_argument("--namespace", default="", help="namespace of the controller manager")
-    parser.add_argument(
-        "--timeout", type=float, default=30.0, help="time limit for services [s]; <= 0: none"
-    )
+    parser.add_argument("--timeout", type=float, default=30.0, help="time limit for services [s]; <= 0: none")
     parser.add_argument("--no-timeout", action="store_true", help="wait forever")
     parser.add_argument("--shutdown-timeout", type=float, help="ignored")
     parser.add_argument("controllers", nargs="+", help="names, or YAML files of controllers")

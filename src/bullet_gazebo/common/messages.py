@@ -183,9 +183,7 @@ def to_reading(now: int, values: Mapping[str, Any]) -> SensorReading:
         for name, each in values.items()
         if isinstance(each, np.ndarray)
     ]
-    return SensorReading(
-        now, arrays, [to_contact_state(each) for each in values.get("contacts", ())]
-    )
+    return SensorReading(now, arrays, [to_contact_state(each) for each in values.get("contacts", ())])
 
 
 def to_wrench_msg(force: poses.Vector, torque: poses.Vector) -> Wrench:

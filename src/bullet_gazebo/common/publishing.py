@@ -137,9 +137,7 @@ class Thinner:
                     topic.flush()
                 except Exception:  # noqa: BLE001 - a message that can't be sent silences no other topic
                     if not rospy.is_shutdown():
-                        rospy.logerr_throttle(
-                            REPEAT, f"a message is lost:\n{traceback.format_exc()}"
-                        )
+                        rospy.logerr_throttle(REPEAT, f"a message is lost:\n{traceback.format_exc()}")
 
     def _stop(self) -> None:
         self._ending.set()
@@ -198,9 +196,7 @@ class ClockTopic(ThinnedTopic):
         self._publisher.publish(Clock(time))
 
 
-def advertise_states(
-    sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool
-) -> None:
+def advertise_states(sim: Simulator, thinner: Thinner, clock_frequency: float, network: bool) -> None:
     """Publishes /clock and, with `network`, the state topics, on the simulation's ticks."""
     topics: list[Callable[[int], None]] = [ClockTopic(sim, thinner, clock_frequency)]
     if network:

@@ -49,9 +49,7 @@ class ControllerAction(ABC):
         self._closing = self._closed = False
         self._status_due = 0.0  # [s]
         self._name = rospy.names.ns_join(namespace, self.name)
-        self._server = SteadyActionServer(
-            self._name, self.action, self._pursue, self._cancel, self._clock
-        )
+        self._server = SteadyActionServer(self._name, self.action, self._pursue, self._cancel, self._clock)
         self._server.start()
         with sim.lock:  # a tick looks through them
             sim.outboxes.append(self)
@@ -235,9 +233,7 @@ class SteadyActionServer(ActionServer):
         kept = {goal: self._ended.get(goal, now) for goal in ended[-MOST_KEPT:]}
         self._ended = {goal: since for goal, since in kept.items() if 0.0 <= now - since <= KEPT}
         self.status_list = [
-            tracker
-            for tracker in self.status_list
-            if not _has_ended(tracker) or _id(tracker) in self._ended
+            tracker for tracker in self.status_list if not _has_ended(tracker) or _id(tracker) in self._ended
         ]
 
 

@@ -25,9 +25,7 @@ BASE_CLASS = "controller_interface::ControllerBase"
 class ControllerServices:
     """Serves one manager. All calls are answered at once, also while the world is paused."""
 
-    def __init__(
-        self, sim: Simulator, thinner: Thinner, manager: ControllerManager, namespace: str
-    ) -> None:
+    def __init__(self, sim: Simulator, thinner: Thinner, manager: ControllerManager, namespace: str) -> None:
         self._sim = sim
         self._thinner = thinner
         self._manager = manager
@@ -44,9 +42,7 @@ class ControllerServices:
             self._advertise("load_controller", srv.LoadController, self._load)
             self._advertise("unload_controller", srv.UnloadController, self._unload)
             self._advertise("switch_controller", srv.SwitchController, self._switch)
-            self._advertise(
-                "reload_controller_libraries", srv.ReloadControllerLibraries, self._reload
-            )
+            self._advertise("reload_controller_libraries", srv.ReloadControllerLibraries, self._reload)
             opened.pop_all()
 
     def shutdown(self) -> None:
@@ -75,9 +71,7 @@ class ControllerServices:
         with self._sim.lock.glance():
             return srv.ListControllersResponse([_state(each) for each in self._manager.loaded])
 
-    def _list_types(
-        self, request: srv.ListControllerTypesRequest
-    ) -> srv.ListControllerTypesResponse:
+    def _list_types(self, request: srv.ListControllerTypesRequest) -> srv.ListControllerTypesResponse:
         types = sorted(self._manager.types)
         return srv.ListControllerTypesResponse(types, [BASE_CLASS] * len(types))
 
@@ -102,9 +96,7 @@ class ControllerServices:
 
     def _open(self, controller: Controller) -> ControllerTopics:
         try:
-            return ControllerTopics(
-                self._sim, self._thinner, self._manager, controller, self._namespace
-            )
+            return ControllerTopics(self._sim, self._thinner, self._manager, controller, self._namespace)
         except faults() as error:  # from a user's outputs, inputs or pids
             with self._sim.lock:
                 self._manager.unload(controller.name)
@@ -120,9 +112,7 @@ class ControllerServices:
         if request.strictness == 0:
             rospy.logwarn("Controller manager: strictness was not set, best effort is used.")
         with self._sim.lock:
-            self._manager.switch(
-                request.start_controllers, request.stop_controllers, request.strictness
-            )
+            self._manager.switch(request.start_controllers, request.stop_controllers, request.strictness)
         return True
 
     def _reload(self, request: srv.ReloadControllerLibrariesRequest) -> bool:

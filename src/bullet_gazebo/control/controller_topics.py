@@ -168,9 +168,7 @@ class ControllerTopics:
                 rospy.logerr_throttle(REPEAT, f"{topic}: {error}")
             except faults() as error:  # a user's code: the message is lost, the topic continues
                 text = "".join(traceback.format_exception(error))
-                rospy.logerr_throttle(
-                    REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}"
-                )
+                rospy.logerr_throttle(REPEAT, f"{topic}: a message is lost, its reader raised:\n{text}")
 
         subscriber = rospy.Subscriber(topic, kind, receive, queue_size=1, tcp_nodelay=True)
         self._closing.callback(subscriber.unregister)
@@ -221,9 +219,7 @@ class PidTopics:
         self._publisher: rospy.Publisher | None = None
         if pid.publish_state:
             self._publisher = rospy.Publisher(f"{namespace}/state", PidState, queue_size=1)
-            self._topic = ThinnedTopic(
-                thinner, self._publisher.resolved_name, self._publisher.publish
-            )
+            self._topic = ThinnedTopic(thinner, self._publisher.resolved_name, self._publisher.publish)
             pid.sink, pid.listeners = self._publish, self._publisher.get_num_connections
 
     def shutdown(self) -> None:

@@ -29,9 +29,7 @@ from robot_sim.simulator import Simulator
 class TrajectoryTopics:
     """The topic `command`, the action `follow_joint_trajectory` and the service `query_state`."""
 
-    def __init__(
-        self, sim: Simulator, controller: JointTrajectoryController, namespace: str
-    ) -> None:
+    def __init__(self, sim: Simulator, controller: JointTrajectoryController, namespace: str) -> None:
         """`namespace` is the controller's."""
         self._sim = sim
         self._controller = controller
@@ -118,9 +116,7 @@ def to_controller_state(sample: TrajectorySample) -> msg.JointTrajectoryControll
 def _fields(sample: TrajectorySample) -> tuple[Any, ...]:
     """Returns header, names, desired, actual, error: the fields of state and feedback, in their order."""
     points = [
-        JointTrajectoryPoint(
-            **dict(zip(("positions", "velocities", "accelerations"), values, strict=False))
-        )
+        JointTrajectoryPoint(**dict(zip(("positions", "velocities", "accelerations"), values, strict=False)))
         for values in (sample.desired, sample.actual, sample.error)
     ]
     return Header(stamp=to_time(sample.stamp)), sample.names, *points

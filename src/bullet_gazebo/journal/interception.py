@@ -84,9 +84,7 @@ def record_messages(journal: WorldJournal) -> None:
             receive(subscription, messages, connection)
             return
         for message in messages:
-            entry = Entry(
-                JournalEntry.MESSAGE, subscription.resolved_name, bytes_of(message), caller
-            )
+            entry = Entry(JournalEntry.MESSAGE, subscription.resolved_name, bytes_of(message), caller)
             entry.type, entry.md5sum = kind._type, kind._md5sum
             entry.publishers = subscription.get_num_connections()
             is_first = journal.begin(entry)

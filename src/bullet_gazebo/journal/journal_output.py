@@ -63,9 +63,7 @@ class JournalOutput(rospy.SubscribeListener):
             before = self._journal.listen(self._take)
         if before is None:
             before = [JournalEntry(kind=JournalEntry.GONE)]
-            rospy.logwarn(
-                "The beginning of %s is gone, as nobody recorded it: it can't be repeated", TOPIC
-            )
+            rospy.logwarn("The beginning of %s is gone, as nobody recorded it: it can't be repeated", TOPIC)
         with self._news:
             self._newcomers.append((publish, before))
             self._news.notify_all()

@@ -140,9 +140,7 @@ def _scale(text: str) -> float:
 class GazeboNode:
     """The simulator, the thread that moves it, and everything that it offers to ROS."""
 
-    def __init__(
-        self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]
-    ) -> None:
+    def __init__(self, args: argparse.Namespace, engine: Engine, interrupted: Callable[[], bool]) -> None:
         self.sim = Simulator(World(engine), lockstep=args.lockstep)
         self.journal: WorldJournal | None = None
         self._output: JournalOutput | None = None
@@ -184,18 +182,14 @@ class GazeboNode:
             pictures.start()
             rospy.loginfo("Cameras' pictures are made by %s", pictures.name)
             args.renderer = pictures.name
-        plugins = PluginRegistry(
-            self.sim, thinner, args.seed or 0, sensors, args.camera_scale, pictures
-        )
+        plugins = PluginRegistry(self.sim, thinner, args.seed or 0, sensors, args.camera_scale, pictures)
         load_plugins(self.sim, plugins, of_world if network else ())
         if not network:
             return
         with registered_together():
             self._offer_services(plugins, thinner, args)
 
-    def _offer_services(
-        self, plugins: PluginRegistry, thinner: Thinner, args: argparse.Namespace
-    ) -> None:
+    def _offer_services(self, plugins: PluginRegistry, thinner: Thinner, args: argparse.Namespace) -> None:
         # Clients take the world for ready once it can be paused, so the step service comes first.
         stepping: list[object] = []
         if self.journal is not None:
@@ -274,9 +268,7 @@ def _clock_frequency() -> float:
     """Returns ~pub_clock_frequency [Hz of simulated time]; 0 (every tick) if it is invalid."""
     value = rospy.get_param("~pub_clock_frequency", 0)
     # A period of less than a nanosecond, or of more than a thousand years, is a mistake.
-    if isinstance(value, (int, float)) and (
-        value == 0 or 1.0 / MOST_FREQUENT <= value <= MOST_FREQUENT
-    ):
+    if isinstance(value, (int, float)) and (value == 0 or 1.0 / MOST_FREQUENT <= value <= MOST_FREQUENT):
         return float(value)
     rospy.logwarn("~pub_clock_frequency is %r, no frequency: /clock comes with every tick", value)
     return 0.0
@@ -326,9 +318,7 @@ def main(argv: list[str] | None = None, work: Work | None = None) -> int:
     if args.ignored:
         rospy.logwarn("Arguments without effect here: %s", " ".join(args.ignored))
     if args.journal and not args.lockstep:
-        rospy.logwarn(
-            "--journal has no effect: only a world in lock-step (--lockstep) has a journal"
-        )
+        rospy.logwarn("--journal has no effect: only a world in lock-step (--lockstep) has a journal")
     if args.seed is not None:
         seed_random_numbers(args.seed)
         rospy.loginfo("Random numbers start from seed %d", args.seed)

@@ -32,9 +32,7 @@ ENTRY_PATIENCE = 60.0  # [s of wall time] for an entry during which no time pass
 class Changes:
     """Overrides of what was recorded: models, and parameters."""
 
-    def __init__(
-        self, models: Mapping[str, str], parameters: Sequence[tuple[dict[str, Any], str]]
-    ) -> None:
+    def __init__(self, models: Mapping[str, str], parameters: Sequence[tuple[dict[str, Any], str]]) -> None:
         """Takes URDF or SDF texts by model, and values of parameters by name, with their namespace."""
         self.models = models
         self._parameters = parameters
@@ -57,9 +55,7 @@ class Changes:
 class Replay:
     """Dispatches the entries in order, in one thread."""
 
-    def __init__(
-        self, recorded: RecordedJournal, node: GazeboNode, changes: Changes, until: float
-    ) -> None:
+    def __init__(self, recorded: RecordedJournal, node: GazeboNode, changes: Changes, until: float) -> None:
         """Repeats what was recorded until the entry with which that much time has passed [s].
 
         `node` is a simulator in lock-step, as it has started.
@@ -266,9 +262,7 @@ def _require_packages(spawn: JournalEntry) -> None:
         try:
             rospkg.RosPack().get_path(name)
         except rospkg.ResourceNotFound as fault:
-            raise NoRecording(
-                f"package {name} isn't found: ./ws --with names its folder"
-            ) from fault
+            raise NoRecording(f"package {name} isn't found: ./ws --with names its folder") from fault
 
 
 def _damaged(entry: JournalEntry, fault: str) -> NoRecording:

@@ -35,15 +35,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         recorded = RecordedJournal(args.bag)
         _check(recorded, args.bag, args.trust)
         models = {name: expand(path) for name, path in args.model}
-        parameters = [
-            each for name, path in args.params for each in rosparam.load_file(str(path), name)
-        ]
+        parameters = [each for name, path in args.params for each in rosparam.load_file(str(path), name)]
         if models or parameters:
             ns_join = rospy.names.ns_join
-            named = [
-                {ns_join(space, each): values[each] for each in values}
-                for values, space in parameters
-            ]
+            named = [{ns_join(space, each): values[each] for each in values} for values, space in parameters]
             recorded.check_changes(models, named)
     except (NoRecording, CannotExpand, rosparam.RosParamException, OSError) as fault:
         return _tell(str(fault), UNUSABLE)
@@ -97,9 +92,7 @@ def parse_args(argv: Sequence[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _replay(
-    args: argparse.Namespace, recorded: RecordedJournal, changes: Changes, folder: Path
-) -> int:
+def _replay(args: argparse.Namespace, recorded: RecordedJournal, changes: Changes, folder: Path) -> int:
     """Runs the simulator in this thread and the replay in another one; returns the exit code."""
     changes.set_parameters(recorded.start)
     os.environ.pop(gzserver.MORE_ARGUMENTS, None)

@@ -75,9 +75,7 @@ class HandOfGodPlugin(ContextPlugin):
         with self._context.sim.lock:
             for each in message.transforms:
                 if not bad_number(each.transform):
-                    parent, child = (
-                        name.lstrip("/") for name in (each.header.frame_id, each.child_frame_id)
-                    )
+                    parent, child = (name.lstrip("/") for name in (each.header.frame_id, each.child_frame_id))
                     self._frames[child] = parent, from_transform(each.transform)
 
     def _target(self) -> Pose | None:

@@ -211,9 +211,7 @@ def camera_info(context: PluginContext, camera: PinholeCamera, baseline: float =
     f = context.number("focalLength", 0.0) or camera.focal_length
     cx = context.number("Cx", 0.0) or (camera.width + 1.0) / 2.0
     cy = context.number("Cy", 0.0) or (camera.height + 1.0) / 2.0
-    k1, k2, k3, t1, t2 = (
-        context.number(f"distortion{name}", 0.0) for name in ("K1", "K2", "K3", "T1", "T2")
-    )
+    k1, k2, k3, t1, t2 = (context.number(f"distortion{name}", 0.0) for name in ("K1", "K2", "K3", "T1", "T2"))
     return CameraInfo(
         height=camera.height,
         width=camera.width,

@@ -39,9 +39,7 @@ class ControlPlugin:
         self._lock = threading.Lock()
         self._started = ExitStack()  # what shutdown() ends, the last one first
         if not self._try_start():
-            threading.Thread(
-                target=self._wait_and_start, name="robot_description", daemon=True
-            ).start()
+            threading.Thread(target=self._wait_and_start, name="robot_description", daemon=True).start()
 
     def shutdown(self) -> None:
         self._gone.set()

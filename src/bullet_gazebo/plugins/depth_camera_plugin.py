@@ -80,9 +80,7 @@ class DepthCameraPlugin(ContextPlugin):
 
     def _measure(self, now: int) -> None:
         is_cloud = self._cloud.has_subscribers
-        shot = self._pictures.shot(
-            now, colours=is_cloud, depths=is_cloud or self._depth.has_subscribers
-        )
+        shot = self._pictures.shot(now, colours=is_cloud, depths=is_cloud or self._depth.has_subscribers)
         self._stream.take([shot], partial(self._send, now))
 
     def _send(self, now: int, views: Sequence[CameraView]) -> None:

@@ -183,9 +183,7 @@ class WheeledPlugin(DrivePlugin):
         if source == "encoder":
             self._encoder = WheelOdometry(separation)
         elif source != "world":
-            rospy.logwarn(
-                "Plugin %s: no <odometrySource> is called '%s'", context.plugin.filename, source
-            )
+            rospy.logwarn("Plugin %s: no <odometrySource> is called '%s'", context.plugin.filename, source)
         if choice(context, "publishWheelJointState", default=False):
             name = topic_in(self.namespace, "joint_states")
             self._joint_states = advertised(context, name, JointState, 1000)

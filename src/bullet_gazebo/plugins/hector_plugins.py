@@ -43,8 +43,7 @@ ATTRIBUTES = {
     "scale_error": "scale",
 }  # fmt: skip
 MODEL = [
-    Parameter(name, "double", 0.0, 0.0 if name == "drift_frequency" else -MOST, MOST)
-    for name in ATTRIBUTES
+    Parameter(name, "double", 0.0, 0.0 if name == "drift_frequency" else -MOST, MOST) for name in ATTRIBUTES
 ]
 
 
@@ -115,9 +114,7 @@ class HectorImuPlugin(HectorSensor):
         self._imu = Imu(True, self.rate)
         topic = topic_in(self.namespace, context.text("topicName", "imu"))
         bias = topic_in(self.namespace, context.text("biasTopicName", f"{topic}/bias"))
-        self._publisher, self._bias = (
-            advertised(context, name, ImuMsg, 10) for name in (topic, bias)
-        )
+        self._publisher, self._bias = (advertised(context, name, ImuMsg, 10) for name in (topic, bias))
         calibrate = context.text("serviceName", f"{topic}/calibrate")
         self._offer(topic_in(self.namespace, calibrate), Empty, self._spin)
         self._offer(f"{topic}/set_accel_bias", SetBias, self._accel)
@@ -229,9 +226,7 @@ class HectorGpsPlugin(HectorSensor):
                 position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
             )
         )
-        self._velocity.publish(
-            Vector3Stamped(header, Vector3(*self._turned(speed), float(speed[2])))
-        )
+        self._velocity.publish(Vector3Stamped(header, Vector3(*self._turned(speed), float(speed[2]))))
 
     def _turned(self, values: np.ndarray) -> tuple[float, float]:
         """Returns the parts to the north and to the west."""
@@ -266,11 +261,7 @@ class HectorMagneticPlugin(HectorSensor):
         field = rotate(conjugate(self.motion.pose.orientation), self._field)
         seen = Vector3(*self._error.applied(np.array(field), seconds, self.random(now)))
         header = Header(stamp=to_time(now), frame_id=self.frame)
-        message = (
-            MagneticField(header, seen, [0.0] * 9)
-            if self._is_field
-            else Vector3Stamped(header, seen)
-        )
+        message = MagneticField(header, seen, [0.0] * 9) if self._is_field else Vector3Stamped(header, seen)
         self._publisher.publish(message)
 
 

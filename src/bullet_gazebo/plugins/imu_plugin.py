@@ -59,9 +59,7 @@ class ImuPlugin(SensorPlugin):
 class ImuSensorPlugin(ImuPlugin):
     """Publishes what an IMU measures, in its own axes."""
 
-    source = TopicSource(
-        ImuMsg, "imu_data", absent=MODEL, rate=("updateRateHZ", 1.0), read=read_imu
-    )
+    source = TopicSource(ImuMsg, "imu_data", absent=MODEL, rate=("updateRateHZ", 1.0), read=read_imu)
     measurement = ImuSensor
 
     def frame_id(self) -> str:

@@ -186,9 +186,7 @@ class _Senses(Stateful):
             self._events["wheel_drop"].publish(WheelDropEvent(side, dropped[side]))
 
     def _core(self, now: int) -> SensorState:
-        message = SensorState(
-            header=Header(stamp=to_time(now)), time_stamp=now // 1_000_000 % 65536
-        )
+        message = SensorState(header=Header(stamp=to_time(now)), time_stamp=now // 1_000_000 % 65536)
         for name, states in self._state.items():
             # Of two wheels the right one has the lowest bit.
             bits = BITS[-len(states) :]

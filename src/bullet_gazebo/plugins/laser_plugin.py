@@ -24,9 +24,7 @@ FIELDS = [
 
 def read_scan(message: LaserScan) -> dict[str, np.ndarray]:
     """Returns what a scan says."""
-    return {
-        name: np.array(getattr(message, name), np.float32) for name in ("ranges", "intensities")
-    }
+    return {name: np.array(getattr(message, name), np.float32) for name in ("ranges", "intensities")}
 
 
 def read_range(message: Range) -> dict[str, np.ndarray]:

@@ -81,9 +81,7 @@ class PluginContext(Mount):
         self._clocks.append(clock)
         return clock
 
-    def _guarded(
-        self, call: Callable[..., None], what: str, end: Callable[[], None]
-    ) -> Callable[..., None]:
+    def _guarded(self, call: Callable[..., None], what: str, end: Callable[[], None]) -> Callable[..., None]:
         """Returns `call` in a form that reports an exception, and ends further calls by `end`."""
 
         def guarded(*args: int) -> None:
@@ -256,9 +254,7 @@ class PluginRegistry:
                 context.save(f"{model.name}::plugin {len(loaded)}", loaded[-1][1])
                 context.made()
             except DescriptionError as error:
-                rospy.logerr(
-                    "Model '%s': the plugin %s is left out: %s", model.name, plugin.filename, error
-                )
+                rospy.logerr("Model '%s': the plugin %s is left out: %s", model.name, plugin.filename, error)
                 context.release()
             except BaseException:  # noqa: BLE001 - a user's code must not leave the model half loaded
                 context.report("is left out, because it raised")
@@ -312,11 +308,7 @@ def built_in(table: str) -> dict[str, Callable[[Any], Any]]:
         importlib.import_module(f"{__package__}.{found.name}")
         for found in pkgutil.iter_modules(importlib.import_module(__package__ or "").__path__)
     ]
-    return {
-        library: factory
-        for module in modules
-        for library, factory in getattr(module, table, {}).items()
-    }
+    return {library: factory for module in modules for library, factory in getattr(module, table, {}).items()}
 
 
 def _tell_missing_control(model: Model) -> None:

@@ -41,12 +41,9 @@ class RealsensePlugin(ContextPlugin):
         sensors = {sensor.name: sensor for sensor in context.model.description.sensors}
         eyes = [name for name in EYES if prefix + name in sensors]
         if not eyes:
-            raise DescriptionError(
-                f"<prefix>: the model has no sensor '{prefix}{DEPTH}' or the like"
-            )
+            raise DescriptionError(f"<prefix>: the model has no sensor '{prefix}{DEPTH}' or the like")
         self._eyes = [
-            (_Depths if name == DEPTH else _Eye)(context, name, sensors[prefix + name])
-            for name in eyes
+            (_Depths if name == DEPTH else _Eye)(context, name, sensors[prefix + name]) for name in eyes
         ]
 
 

@@ -66,9 +66,7 @@ def subscribe(
     context.closing(subscriber.unregister)
 
 
-def offer_shared(
-    context: PluginContext, name: str, kind: Any, answer: Callable[[Any], Any]
-) -> None:
+def offer_shared(context: PluginContext, name: str, kind: Any, answer: Callable[[Any], Any]) -> None:
     """Offers a service until the plugin ends, unless another robot's plugin offers that name."""
     with suppress(rospy.ServiceException):
         context.closing(rospy.Service(name, kind, answer).shutdown)
@@ -264,9 +262,7 @@ class SensorPlugin(ContextPlugin):
     def topic_name(self) -> str:
         """Returns the name of the topic, in the plugin's namespace."""
         source, context = self.source, self.context
-        return (
-            context.text(source.tag, source.topic) if source.topic else context.required(source.tag)
-        )
+        return context.text(source.tag, source.topic) if source.topic else context.required(source.tag)
 
     def rate(self) -> float:
         """Returns the rate of measurements [Hz]; 0 is every step."""

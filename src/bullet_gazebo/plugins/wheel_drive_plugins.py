@@ -22,9 +22,7 @@ class DiffDrivePlugin(WheeledPlugin):
     """Two wheels; a command holds until the next one or a reset."""
 
     def __init__(self, context: PluginContext) -> None:
-        super().__init__(
-            context, namespace_of(context, MODEL, MODEL), context.rate("updateRate", 100.0)
-        )
+        super().__init__(context, namespace_of(context, MODEL, MODEL), context.rate("updateRate", 100.0))
         self._separation = length(context, "wheelSeparation", 0.34)
         self._wheels = Wheels(
             context,

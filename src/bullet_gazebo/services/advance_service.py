@@ -122,9 +122,7 @@ class Mailboxes:
         deadline = time.monotonic() + CONNECTING
         ways = ((subscriptions, True), (publications, False))
         while any(
-            is_connected(topic, node, publishes) is False
-            for topics, publishes in ways
-            for topic in topics
+            is_connected(topic, node, publishes) is False for topics, publishes in ways for topic in topics
         ):
             if time.monotonic() > deadline:
                 break
@@ -164,9 +162,7 @@ class AdvanceService:
 
     def _serve(self, request: AdvanceWorldRequest) -> AdvanceWorldResponse:
         if not 0 <= request.ticks <= MAX_TICKS:
-            raise ServiceRefused(
-                f"ticks is {request.ticks}: 0 to {MAX_TICKS} can be done in one call"
-            )
+            raise ServiceRefused(f"ticks is {request.ticks}: 0 to {MAX_TICKS} can be done in one call")
         if not request.node.startswith("/"):
             raise ServiceRefused(f"node is '{request.node}': a node's full name is needed")
         mailbox = self._mailboxes.of(request.node)

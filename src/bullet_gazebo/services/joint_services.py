@@ -29,9 +29,7 @@ class JointServices:
             offer("~set_model_configuration", srv.SetModelConfiguration, self._set_configuration),
         ]
 
-    def _get_properties(
-        self, request: srv.GetJointPropertiesRequest
-    ) -> srv.GetJointPropertiesResponse:
+    def _get_properties(self, request: srv.GetJointPropertiesRequest) -> srv.GetJointPropertiesResponse:
         with self._sim.lock.glance():
             model, name = existing(self._sim.world.joint(request.joint_name), NO_JOINT)
             position, rate = model.joint_state(name)

@@ -57,9 +57,7 @@ class ModelServices:
         ]
         self._topic = rospy.Subscriber("~set_model_state", ModelState, self._hear, queue_size=QUEUE)
 
-    def _get_properties(
-        self, request: srv.GetModelPropertiesRequest
-    ) -> srv.GetModelPropertiesResponse:
+    def _get_properties(self, request: srv.GetModelPropertiesRequest) -> srv.GetModelPropertiesResponse:
         with self._sim.lock.glance():
             model = existing(self._sim.world.model(request.model_name), NO_MODEL)
             # All names are unscoped, and canonical_body_name is never filled.
@@ -113,9 +111,7 @@ class ModelServices:
             )
             check_message(wanted)
             # The twist is turned with the frame; the frame's own velocity is not added.
-            linear, angular = (
-                rotate(frame[0].orientation, part) for part in from_twist_msg(wanted.twist)
-            )
+            linear, angular = (rotate(frame[0].orientation, part) for part in from_twist_msg(wanted.twist))
             pose = frame[0].compose(from_pose_msg(wanted.pose))
             self._sim.place_model(model, pose, (linear, angular))
         return "SetModelState: set model state done"
@@ -134,9 +130,7 @@ class LinkServices:
         ]
         self._topic = rospy.Subscriber("~set_link_state", LinkState, self._hear, queue_size=QUEUE)
 
-    def _get_properties(
-        self, request: srv.GetLinkPropertiesRequest
-    ) -> srv.GetLinkPropertiesResponse:
+    def _get_properties(self, request: srv.GetLinkPropertiesRequest) -> srv.GetLinkPropertiesResponse:
         with self._sim.lock.glance():
             link = existing(self._sim.world.link(request.link_name), NO_LINK)
             inertia, gravity = link_inertia(*link), link[0].description.links[link[1]].gravity
@@ -173,9 +167,7 @@ class LinkServices:
             fault = f"reference reference_frame not found, {SCOPE}"
             frame = existing(world.frame(request.reference_frame), fault)
             pose, twist = seen_from(link[0].link_state(link[1]), frame)
-        state = LinkState(
-            request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame
-        )
+        state = LinkState(request.link_name, to_pose_msg(pose), to_twist_msg(twist), request.reference_frame)
         return srv.GetLinkStateResponse(state, True, "GetLinkState: got state")
 
     def _hear(self, state: LinkState) -> None:

@@ -80,9 +80,7 @@ class SnapshotServices:
 
     def _check_room(self, name: str) -> None:
         if len(self._kept) >= MOST and name not in self._kept:
-            raise ServiceRefused(
-                f"{MOST} states are kept already: name some that are to be forgotten"
-            )
+            raise ServiceRefused(f"{MOST} states are kept already: name some that are to be forgotten")
 
     def _find(self, name: str) -> Snapshot:
         if name not in self._kept:
@@ -97,9 +95,7 @@ class SnapshotServices:
             if request.data and request.name:
                 self._check_room(request.name)
             try:
-                given = (
-                    Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
-                )
+                given = Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
                 self._sim.await_holds()
                 self._sim.restore_state(given)
                 if request.data and request.name:  # without what the data had beyond a state

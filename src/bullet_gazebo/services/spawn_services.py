@@ -54,9 +54,7 @@ HOME_MODELS = "~/.gazebo/models"
 class SpawnServices:
     """Services that bring models and lights into the world, and take models out."""
 
-    def __init__(
-        self, sim: Simulator, plugins: PluginRegistry, one_at_a_time: threading.Lock
-    ) -> None:
+    def __init__(self, sim: Simulator, plugins: PluginRegistry, one_at_a_time: threading.Lock) -> None:
         """While someone else holds `one_at_a_time`, requests wait."""
         self._sim = sim
         self._plugins = plugins
@@ -120,8 +118,7 @@ class SpawnServices:
             frame = self._sim.world.frame(request.reference_frame)
             if frame is None:
                 raise LookupError(
-                    "reference reference_frame not found, "
-                    "did you forget to scope the link by model name?"
+                    "reference reference_frame not found, did you forget to scope the link by model name?"
                 )
         pose = frame[0].compose(pose)
         if not is_finite(pose) or max(map(abs, pose.position)) > FURTHEST:
@@ -130,9 +127,7 @@ class SpawnServices:
             )
         return pose
 
-    def _add(
-        self, request: srv.SpawnModelRequest, entity: ModelDescription | Light, pose: Pose
-    ) -> None:
+    def _add(self, request: srv.SpawnModelRequest, entity: ModelDescription | Light, pose: Pose) -> None:
         name, world = request.model_name, self._sim.world
         if isinstance(entity, Light):
             with self._sim.lock:
@@ -166,9 +161,7 @@ def read_world(name: str, interrupted: Callable[[], bool]) -> WorldDescription:
     """
     path = find_world(name)
     if path is None:
-        rospy.logwarn(
-            "World file '%s' is not found: the world is empty but for a ground plane", name
-        )
+        rospy.logwarn("World file '%s' is not found: the world is empty but for a ground plane", name)
         return empty_world()
     try:
         world = load_world(path, resources(), Reading(interrupted))
@@ -227,9 +220,7 @@ def _log(what: str, found: WorldDescription | ModelDescription) -> None:
 
 @functools.cache
 def _tell_stand_in(name: str) -> None:
-    rospy.logwarn(
-        "model://%s is not installed: a simple shape of its size and mass stands in for it", name
-    )
+    rospy.logwarn("model://%s is not installed: a simple shape of its size and mass stands in for it", name)
 
 
 def _listed(texts: list[str]) -> list[str]:

@@ -80,8 +80,7 @@ class Addresses:
         self.joints = [joint for _, joint in self._pairs]
         """All joints with a transmission, in the order of answers."""
         self.joint_names = [
-            f"{robot.model.name}::{joint.name}" if scoped else joint.name
-            for robot, joint in self._pairs
+            f"{robot.model.name}::{joint.name}" if scoped else joint.name for robot, joint in self._pairs
         ]
 
     def commanded(self, controllers: Sequence[str], joints: Sequence[str]) -> Commanded:
@@ -127,8 +126,7 @@ class Addresses:
     @cached_property
     def _actuated(self) -> dict[str, list[Actuated]]:
         return _by_name(
-            (joint.name, f"{robot.model.name}::{joint.name}", (robot, joint))
-            for robot, joint in self._pairs
+            (joint.name, f"{robot.model.name}::{joint.name}", (robot, joint)) for robot, joint in self._pairs
         )
 
     @cached_property
@@ -176,9 +174,7 @@ def _by_name(entries: Iterable[tuple[str, str, Found]]) -> dict[str, list[Found]
     return by_name
 
 
-def _only(
-    known: dict[str, list[Found]], name: str, missing: str, several: str, advice: str = ""
-) -> Found:
+def _only(known: dict[str, list[Found]], name: str, missing: str, several: str, advice: str = "") -> Found:
     entries = known.get(name, [])
     if not entries:
         raise ControlError(f"{missing}{did_you_mean(name, known)}{advice}")
@@ -210,14 +206,10 @@ class StepPlan:
         self.placed_models = _placed_models(sim, request)
         self.placed_joints = _placed_joints(addresses, request)
         check_numbers("commands", request.commands)
-        _check_list(
-            "commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands
-        )
+        _check_list("commanded_joints", request.commanded_joints, "joint_commands", request.joint_commands)
         self.commanded = addresses.commanded(request.controllers, request.commanded_joints)
         if self.commanded.size != len(request.commands):
-            raise ControlError(
-                f"{len(request.controllers)} controllers but {len(request.commands)} commands"
-            )
+            raise ControlError(f"{len(request.controllers)} controllers but {len(request.commands)} commands")
 
 
 def query_of(request: StepWorldRequest | PrepareStepRequest) -> StateQuery:
@@ -260,9 +252,7 @@ def _placed_joints(addresses: Addresses, request: StepWorldRequest) -> dict[Mode
     _check_list("joints", names, "velocities", velocities)
     joints = addresses.movable_joints(names)
     placed: dict[Model, Placing] = {}
-    for (model, joint), position, velocity in zip(
-        joints, request.positions, velocities, strict=True
-    ):
+    for (model, joint), position, velocity in zip(joints, request.positions, velocities, strict=True):
         positions, speeds = placed.setdefault(model, ({}, {}))
         positions[joint], speeds[joint] = position, velocity
     return placed

@@ -73,9 +73,7 @@ class _Prepared:
                 for each, (_, at) in zip(commanded.controllers, commanded.ports, strict=True)
             ]
             wanted += [f"joint '{each.name}' takes 1" for each in commanded.joints]
-            raise ControlError(
-                f"{len(commands)} commands where {', '.join(wanted) or 'none is taken'}"
-            )
+            raise ControlError(f"{len(commands)} commands where {', '.join(wanted) or 'none is taken'}")
         check_numbers("commands", commands)
 
     def read(self, stepped: bool) -> tuple[list[float], list[object]]:

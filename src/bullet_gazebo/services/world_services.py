@@ -266,9 +266,7 @@ class WorldControl:
         XML-RPC has no signatures: any number of arguments may come, of any of its types.
         """
         if not 1 <= len(arguments) <= 2:
-            return _refused(
-                f"{len(arguments)} arguments: a command, and for step a number of steps"
-            )
+            return _refused(f"{len(arguments)} arguments: a command, and for step a number of steps")
         command, count = (*arguments, 1)[:2]
         # A bool is an int in Python, and no number here.
         if not isinstance(command, str) or type(count) is not int:

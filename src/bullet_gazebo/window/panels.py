@@ -129,9 +129,7 @@ class Controllers:
             return "no controller manager"
         lines: list[str] = []
         for manager, controllers in self._found.items():
-            lines.append(
-                f"<b>{html.escape(manager)}</b><ul style='margin: 0; padding-left: 1.2em'>"
-            )
+            lines.append(f"<b>{html.escape(manager)}</b><ul style='margin: 0; padding-left: 1.2em'>")
             for each in controllers:
                 joints = ", ".join(html.escape(joint) for joint in _claimed(each))
                 weight = 600 if each.state == "running" else 400

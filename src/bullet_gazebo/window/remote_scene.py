@@ -144,6 +144,4 @@ class Commands:
 
     def place_joint(self, model: str, joint: str, position: float) -> None:
         """Puts a joint at `position` [rad, m], at rest."""
-        self._call(
-            "set_model_configuration", srv.SetModelConfiguration, model, "", [joint], [position]
-        )
+        self._call("set_model_configuration", srv.SetModelConfiguration, model, "", [joint], [position])

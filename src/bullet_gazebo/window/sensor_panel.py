@@ -52,9 +52,7 @@ def draw_scan(message: LaserScan) -> Drawing:
     ranges = np.array(message.ranges, float)[: round(span) + 1]
     met = np.isfinite(ranges)
     angles = message.angle_min + step * np.flatnonzero(met)
-    points = ranges[met, None] * np.column_stack(
-        [np.cos(angles), np.sin(angles), np.zeros(len(angles))]
-    )
+    points = ranges[met, None] * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
     order = np.cumsum(met)  # of the points, from 1
     pairs = np.flatnonzero(met[:-1] & met[1:])
     faces = np.column_stack([np.zeros(len(pairs), int), order[pairs], order[pairs + 1]])
@@ -65,9 +63,7 @@ def draw_range(message: Range) -> Drawing:
     """Draws a range as a scan of equal ranges."""
     half = message.field_of_view / 2.0
     ranges = [message.range] * CONE
-    scan = LaserScan(
-        angle_min=-half, angle_max=half, angle_increment=2.0 * half / (CONE - 1), ranges=ranges
-    )
+    scan = LaserScan(angle_min=-half, angle_max=half, angle_increment=2.0 * half / (CONE - 1), ranges=ranges)
     return draw_scan(scan)
 
 
@@ -274,9 +270,7 @@ class SensorView:
             self._clear()
             return
         with self._server.atomic():
-            self._frame = scene.add_frame(
-                name, show_axes=False, position=place[:3], wxyz=place[[6, 3, 4, 5]]
-            )
+            self._frame = scene.add_frame(name, show_axes=False, position=place[:3], wxyz=place[[6, 3, 4, 5]])
             colours = RED if drawing.colours is None else drawing.colours
             points = drawing.points.astype(np.float32)
             scene.add_point_cloud(

@@ -85,9 +85,7 @@ class Window:
         except (ServiceFailed, ControlFailed, rospy.ROSException) as fault:
             rospy.logwarn("The window: %s", fault)
             for client in self._server.get_clients().values():
-                client.add_notification(
-                    "It wasn't done", str(fault), auto_close_seconds=NOTICE, color="red"
-                )
+                client.add_notification("It wasn't done", str(fault), auto_close_seconds=NOTICE, color="red")
 
     def run(self) -> None:
         """Shows the world until the node is shut down."""

@@ -17,10 +17,7 @@ NOT_FOLLOWING = frozenset(
 
 def watch_for_rospy() -> None:
     """Makes this process follow the clock if it becomes a node."""
-    if (
-        ADDRESS not in os.environ
-        or os.path.basename(sys.argv[0] if sys.argv else "") in NOT_FOLLOWING
-    ):
+    if ADDRESS not in os.environ or os.path.basename(sys.argv[0] if sys.argv else "") in NOT_FOLLOWING:
         return
     sys.meta_path.insert(0, AfterImport("rospy", _wrap_init_node))
 

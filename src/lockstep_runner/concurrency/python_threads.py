@@ -158,11 +158,7 @@ class _Tasks:
     def wait_for_begin(self, executor: Any) -> None:
         """Waits until the last task has begun, unless all workers are busy or the executor is broken."""
         self.submitted += 1
-        while (
-            self.begun < self.submitted
-            and self.busy < executor._max_workers
-            and not executor._broken
-        ):
+        while self.begun < self.submitted and self.busy < executor._max_workers and not executor._broken:
             originals.condition_wait(self.guard, LOOK)
 
     @contextlib.contextmanager

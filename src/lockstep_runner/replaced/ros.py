@@ -121,9 +121,7 @@ class _Waiting:
             before = 0 if last.latched() else last.count
 
         def wait(span: float) -> bool:
-            return self._runner.wait(
-                span, lambda: last.count > before or rospy.is_shutdown(), [name]
-            )
+            return self._runner.wait(span, lambda: last.count > before or rospy.is_shutdown(), [name])
 
         silence = max(0.0, min(limit, SILENCE - last.silence))
         came = wait(silence)

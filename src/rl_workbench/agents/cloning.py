@@ -23,14 +23,10 @@ class CloneNetwork(nn.Module):
     `shapes` are those of the parts: images (height, width, channels) go through convolutions.
     """
 
-    def __init__(
-        self, shapes: Sequence[tuple[int, ...]], outputs: int, hidden: Sequence[int]
-    ) -> None:
+    def __init__(self, shapes: Sequence[tuple[int, ...]], outputs: int, hidden: Sequence[int]) -> None:
         super().__init__()
         self.shapes, self.sizes = list(shapes), [math.prod(shape) for shape in shapes]
-        numbers = sum(
-            size for size, shape in zip(self.sizes, shapes, strict=True) if len(shape) < 3
-        )
+        numbers = sum(size for size, shape in zip(self.sizes, shapes, strict=True) if len(shape) < 3)
         self.scaling = Scaling(np.zeros(numbers, np.float32), np.ones(numbers, np.float32), CLIP)
         self.images = nn.ModuleList(_convolutions(shape) for shape in shapes if len(shape) == 3)
         widths = [numbers + FEATURES * len(self.images), *hidden]
@@ -111,9 +107,7 @@ class CloningAgent:
         chosen = self._generator.integers(len(self._observations), size=self._batch)
         index = torch.from_numpy(chosen).to(self._device)
         outputs, targets = self.network(self._observations[index]), self._targets[index]
-        lost = (
-            nn.functional.cross_entropy if isinstance(self._actions, int) else nn.functional.l1_loss
-        )
+        lost = nn.functional.cross_entropy if isinstance(self._actions, int) else nn.functional.l1_loss
         loss = lost(outputs, targets)
         self._optimizer.zero_grad()
         loss.backward()

@@ -11,9 +11,7 @@ class Scaling(nn.Module):
     offset: torch.Tensor
     factors: torch.Tensor
 
-    def __init__(
-        self, offset: np.ndarray, factors: np.ndarray, limit: float = float("inf")
-    ) -> None:
+    def __init__(self, offset: np.ndarray, factors: np.ndarray, limit: float = float("inf")) -> None:
         super().__init__()
         self.register_buffer("offset", torch.from_numpy(offset.copy()))
         self.register_buffer("factors", torch.from_numpy(factors.copy()))

@@ -91,9 +91,7 @@ class TwoNetworks(ABC):
     They map observations (N, D) to probabilities (N, A) and to estimated returns (N, 1).
     """
 
-    def __init__(
-        self, policy: nn.Module, value: nn.Module, rates: tuple[float, float], seed: int
-    ) -> None:
+    def __init__(self, policy: nn.Module, value: nn.Module, rates: tuple[float, float], seed: int) -> None:
         self.policy = policy
         self.value = value
         self.policy_optimizer = torch.optim.Adam(policy.parameters(), rates[0])

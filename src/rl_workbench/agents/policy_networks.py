@@ -35,8 +35,7 @@ class PolicyNetworkBase(nn.Module):
         """Returns a copy that maps a prepared observation (D,) to the outputs (A,)."""
         layers = [self.hidden, self.fc] if self.has_hidden else [self.fc]
         *hidden, (weight, bias) = [
-            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
-            for layer in layers
+            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy()) for layer in layers
         ]
 
         def outputs(seen: np.ndarray) -> np.ndarray:
@@ -86,9 +85,7 @@ class PairActor:
 class SoftmaxActor:
     """Acts for any number of actions, with or without a hidden layer."""
 
-    def __init__(
-        self, network: SoftmaxNetwork, prepare: Callable[[np.ndarray], np.ndarray]
-    ) -> None:
+    def __init__(self, network: SoftmaxNetwork, prepare: Callable[[np.ndarray], np.ndarray]) -> None:
         self._prepare, self._outputs = prepare, network.in_numpy()
 
     def _preferences(self, observation: np.ndarray) -> np.ndarray:

@@ -191,8 +191,7 @@ class ReinforceAgent(TwoNetworks):
             advantages.append(gains)
             targets.append(gains + values[:-1])
         return tuple(  # type: ignore[return-value]
-            torch.from_numpy(np.concatenate(each).astype(np.float32))
-            for each in (advantages, targets)
+            torch.from_numpy(np.concatenate(each).astype(np.float32)) for each in (advantages, targets)
         )
 
     def _values(self, episode: Episode) -> np.ndarray:

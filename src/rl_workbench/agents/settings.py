@@ -15,9 +15,7 @@ def discount() -> float:
 class DQNSettings:
     """The options of DQN. Steps are environment steps, unless called gradient steps."""
 
-    total_timesteps: int = option(
-        50_000, "length of the training [steps]; schedules span it", 1, 2**53
-    )
+    total_timesteps: int = option(50_000, "length of the training [steps]; schedules span it", 1, 2**53)
     learning_rate: float = option(1e-3, "learning rate of Adam", 0, 10)
     lr_schedule: str = option(
         "constant",
@@ -32,15 +30,11 @@ class DQNSettings:
     train_frequency: int = option(1, "steps between rounds of learning", 1, 2**31)
     gradient_steps: int = option(1, "gradient steps in each round of learning", 1, 2**24)
     gamma: float = discount()
-    n_step: int = option(
-        1, "rewards summed before bootstrapping from the value estimate", 1, 10_000
-    )
+    n_step: int = option(1, "rewards summed before bootstrapping from the value estimate", 1, 10_000)
     double: bool = option(
         True, "double DQN: the network picks the next action, the target network evaluates it"
     )
-    dueling: bool = option(
-        False, "dueling network: separate outputs for the state value and the advantages"
-    )
+    dueling: bool = option(False, "dueling network: separate outputs for the state value and the advantages")
     hidden_sizes: tuple[int, ...] = option((128, 128), "units in each hidden layer")
     loss: str = option("huber", "loss function applied to the TD error", choices=("mse", "huber"))
     max_grad_norm: float = option(10.0, "clip the gradient to this norm; 0: no clipping", 0, 1e18)
@@ -89,9 +83,7 @@ class ReinforceSettings:
     value_epochs: int = option(20, "gradient steps of the baseline for each batch", 0, 10**6)
     batch_episodes: int = option(1, "episodes for each gradient step of the policy", 1, 10**6)
     entropy_coefficient: float = option(0.0, "weight of the policy's entropy in its loss", 0, 1e6)
-    policy_hidden: int = option(
-        0, "units in the policy's hidden layer; 0: a linear policy", 0, 2**16
-    )
+    policy_hidden: int = option(0, "units in the policy's hidden layer; 0: a linear policy", 0, 2**16)
     log_std_init: float = option(
         -0.5, "continuous actions: log of the initial standard deviation, in units of half their range",
         -4, 4,
@@ -111,22 +103,16 @@ class ReinforceSettings:
     def __post_init__(self) -> None:
         check_options(self)
         if not all(each > 0.0 for each in self.observation_scale):
-            raise WorkbenchError(
-                f"observation_scale must be positive, not {self.observation_scale}"
-            )
+            raise WorkbenchError(f"observation_scale must be positive, not {self.observation_scale}")
 
 
 @dataclass(frozen=True)
 class CloningSettings:
     """The options of behaviour cloning. Steps are gradient steps."""
 
-    demos: str = option(
-        "", "folder of demonstrations, as `demonstrate` writes them", metavar="FOLDER"
-    )
+    demos: str = option("", "folder of demonstrations, as `demonstrate` writes them", metavar="FOLDER")
     learning_rate: float = option(1e-3, "learning rate of AdamW", 0, 10)
-    weight_decay: float = option(
-        1e-4, "share of the weights that a step takes away, by the rate", 0, 1
-    )
+    weight_decay: float = option(1e-4, "share of the weights that a step takes away, by the rate", 0, 1)
     batch_size: int = option(256, "moments of demonstrations per gradient step", 1, 2**24)
     hidden_sizes: tuple[int, ...] = option((256, 256), "units in each hidden layer")
 

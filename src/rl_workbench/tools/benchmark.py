@@ -141,9 +141,7 @@ def _options(value: Any, origin: str) -> dict[str, Any]:
 def make_variant(origin: str, name: str, options: dict[str, Any]) -> Variant:
     """Makes a variant, whose algorithm must be installed and know its options."""
     if not NAME.fullmatch(name):
-        raise WorkbenchError(
-            f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}"
-        )
+        raise WorkbenchError(f"{origin}: a variant's name is letters, digits, _, -, + and ., not {name!r}")
     rest = {key: value for key, value in options.items() if value is not None}
     kind = str(rest.pop("algo", "dqn"))
     if kind not in ALGORITHMS:

@@ -67,8 +67,7 @@ class HeldKeys:
             command = gui.add_command(f"Action {name}", hotkey=key.upper())  # type: ignore[arg-type]
             command.on_trigger(partial(self._press, key, number))
         words = [
-            f"<b>{key.upper()}</b> {escape(name)}"
-            for key, name in zip(self._until, names, strict=False)
+            f"<b>{key.upper()}</b> {escape(name)}" for key, name in zip(self._until, names, strict=False)
         ]
         gui.add_html(
             "<div style='padding: 0 0.8em'><small>The time runs from the first key on. Hold keys, with the"

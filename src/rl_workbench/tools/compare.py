@@ -33,8 +33,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     runs = find_runs(arguments.runs, warn)
     episodes, which = arguments.episodes, arguments.checkpoint
     every = [  # seeds of one experiment and environment make a group
-        results.examine(run, f"{run.experiment} in {run.env_id}", episodes, warn, which)
-        for run in runs
+        results.examine(run, f"{run.experiment} in {run.env_id}", episodes, warn, which) for run in runs
     ]
     every.sort(key=lambda result: (result.group, result.seed, result.run))
     groups = results.grouped(every)

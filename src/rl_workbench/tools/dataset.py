@@ -55,9 +55,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
             command = shlex.join([sys.executable, "-m", "pip", "install", "minari[hdf5]"])
             raise WorkbenchError(f"--format minari needs Minari: {command} installs it")
         if not re.fullmatch(r"[\w-]+-v\d+", out.name, re.ASCII):
-            raise WorkbenchError(
-                f"--out: Minari's datasets are named as in pick-v0, not {out.name}"
-            )
+            raise WorkbenchError(f"--out: Minari's datasets are named as in pick-v0, not {out.name}")
     if out.exists():
         raise WorkbenchError(f"{out} exists; a dataset gets a new folder")
     found = demonstrations.load_all(arguments.demos)

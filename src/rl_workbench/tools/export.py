@@ -21,7 +21,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     from rl_workbench.storage import check_writable, write_file
     from rl_workbench.tools.policies import load_learned
     from rl_workbench.tools.runs import open_run
-    from rl_workbench.tools.torchscript import export, open_exported
+    from rl_workbench.tools.torchscript import export
 
     run = open_run(arguments.run)
     check_writable(arguments.out)
@@ -29,5 +29,4 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
     with closing(policy.env):
         content = export(run, policy)
     write_file(arguments.out, lambda stream: stream.write(content))
-    open_exported(arguments.out)  # checks that the file on disk is readable
     tell(f"{arguments.out}: the policy of {policy.checkpoint}, {policy.steps} steps")

@@ -132,9 +132,7 @@ def command(job: Job, program: Sequence[str]) -> list[str]:
     return [*program, "train", *own, *job.flags]
 
 
-def _finish(
-    process: subprocess.Popen[bytes], is_stopped: Callable[[], bool]
-) -> tuple[int, float, bool]:
+def _finish(process: subprocess.Popen[bytes], is_stopped: Callable[[], bool]) -> tuple[int, float, bool]:
     """Waits for a training; returns its exit code, its processor time [s] and whether it was stopped."""
     deadline = math.inf
     # wait4 reports this one process; getrusage only the sum over all children.

@@ -94,13 +94,8 @@ def _seed_curve(run: Run, tag: str) -> "SeedCurve | None":
     return SeedCurve(curve.steps, curve.values, is_complete) if len(curve.values) else None
 
 
-def _success_panels(
-    runs: Sequence[Run], name_of: Callable[[Run], str], curve_of: CurveOf
-) -> "list[Panel]":
-    return [
-        panel._replace(threshold=None, shows_success=True)
-        for panel in _panels(runs, name_of, curve_of)
-    ]
+def _success_panels(runs: Sequence[Run], name_of: Callable[[Run], str], curve_of: CurveOf) -> "list[Panel]":
+    return [panel._replace(threshold=None, shows_success=True) for panel in _panels(runs, name_of, curve_of)]
 
 
 def _panels(

@@ -43,9 +43,7 @@ def train(job: Job, program: Program, folder: Path, token: str, wanted: dict[str
     with contextlib.suppress(OSError):
         seen = (folder / TOKEN).read_text(encoding="utf-8")
     if seen != token:
-        raise WorkbenchError(
-            f"{node} doesn't see {folder}: --out must be a folder that all nodes share"
-        )
+        raise WorkbenchError(f"{node} doesn't see {folder}: --out must be a folder that all nodes share")
     versions = library_versions()
     others = [f"{name} {versions.get(name)}, not {its}" for name, its in wanted.items()
               if versions.get(name) != its]  # fmt: skip

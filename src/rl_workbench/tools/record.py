@@ -152,9 +152,7 @@ class SideBySide(Sequence["np.ndarray"]):
             picture: Image.Image = Image.open(BytesIO(frame.seen))
             if frame.ended:
                 picture = Image.blend(picture, Image.new("RGB", picture.size, PAPER), FADED)
-            pictures.append(
-                _captioned(picture, frame.caption(film.title)) if self._captions else picture
-            )
+            pictures.append(_captioned(picture, frame.caption(film.title)) if self._captions else picture)
         size = sum(each.width for each in pictures), max(each.height for each in pictures)
         sheet, left = Image.new("RGB", size, PAPER), 0
         for each in pictures:
@@ -194,9 +192,7 @@ def _write_gif(stream: BinaryIO, frames: "Sequence[np.ndarray]", rate: float) ->
 
     some = np.concatenate([frames[0], frames[len(frames) // 2], frames[len(frames) - 1]])
     palette = Image.fromarray(some).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-    reduced = [
-        Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in frames
-    ]
+    reduced = [Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
     # Each frame lasts whole ticks; on average they last 1 / rate.
     ticks = accumulate([1000.0 / rate / GIF_TICK] * len(reduced), initial=0.0)
     reduced[0].save(

@@ -66,9 +66,7 @@ class EpisodeFrame(NamedTuple):
 class PictureView:
     """Takes the pictures of `render`, scaled to a size, and shows them on a page if there is one."""
 
-    def __init__(
-        self, env: Env, server: "viser.ViserServer | None" = None, size: Size | None = None
-    ) -> None:
+    def __init__(self, env: Env, server: "viser.ViserServer | None" = None, size: Size | None = None) -> None:
         if env.render_mode != "rgb_array":
             raise WorkbenchError("the environment draws no pictures")
         self._env, self._server, self._size = env, server, size
@@ -192,9 +190,7 @@ class RecordedEpisode:
 class EpisodeRecorder:
     """Plays and records episodes of a run, which may begin later; only its thread touches the environment."""
 
-    def __init__(
-        self, folder: Path, server: "viser.ViserServer", env_options: dict[str, Any]
-    ) -> None:
+    def __init__(self, folder: Path, server: "viser.ViserServer", env_options: dict[str, Any]) -> None:
         self._folder, self._server, self._env_options = folder, server, env_options
         self._env: Env | None = None
         self.view: View | None = None

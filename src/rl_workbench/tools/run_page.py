@@ -133,9 +133,7 @@ class Playback:
             if self._is_playing and self._is_at_end():
                 self._position = 0.0
             self._button.label = "Pause" if self._is_playing else "Play"
-            self._button.icon = (
-                viser.Icon.PLAYER_PAUSE if self._is_playing else viser.Icon.PLAYER_PLAY
-            )
+            self._button.icon = viser.Icon.PLAYER_PAUSE if self._is_playing else viser.Icon.PLAYER_PLAY
 
     def _seek(self, event: viser.GuiEvent[Any]) -> None:
         if event.client is not None:  # a user's change, not `_show`'s

@@ -259,6 +259,4 @@ def _distribution(value: Any, origin: str) -> Any:
             return distributions.FloatDistribution(low, high, log)
     except ValueError as error:
         raise WorkbenchError(f"{origin}: {error}") from error
-    raise WorkbenchError(
-        f"{origin} needs numbers low and high, or a list of choices, not {value!r}"
-    )
+    raise WorkbenchError(f"{origin} needs numbers low and high, or a list of choices, not {value!r}")

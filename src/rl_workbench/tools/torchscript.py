@@ -43,9 +43,7 @@ def open_exported(path: Path) -> ExportedPolicy:
         raise WorkbenchError(f"{path} is not an exported policy of this version")
     lacks = [name for name, kind in READ.items() if not isinstance(metadata.get(name), kind)]
     if lacks:
-        raise WorkbenchError(
-            f"{path}: its {METADATA} has no {' and no '.join(lacks)} that can be read"
-        )
+        raise WorkbenchError(f"{path}: its {METADATA} has no {' and no '.join(lacks)} that can be read")
 
     @torch.no_grad()
     def act(observation: Observation) -> Any:
@@ -84,10 +82,7 @@ def batch(observations: Sequence[Observation]) -> Any:
     """Stacks observations for a module: a tensor (N, ...), or a dict of those."""
     first = observations[0]
     if isinstance(first, dict):
-        return {
-            name: torch.from_numpy(np.stack([each[name] for each in observations]))
-            for name in first
-        }
+        return {name: torch.from_numpy(np.stack([each[name] for each in observations])) for name in first}
     return torch.from_numpy(np.stack(observations))
 
 
@@ -99,9 +94,7 @@ def described(space: spaces.Space[Any]) -> dict[str, Any]:
             return {"kind": kind, "spaces": {name: described(each) for name, each in space.items()}}
         case spaces.Box():
             nothing: Any = None
-            low, high = (
-                np.where(np.isfinite(end), end, nothing) for end in (space.low, space.high)
-            )
+            low, high = (np.where(np.isfinite(end), end, nothing) for end in (space.low, space.high))
             about = {"shape": list(space.shape), "dtype": str(space.dtype)}
             return {"kind": kind, **about, "low": low.tolist(), "high": high.tolist()}
         case spaces.Discrete():

@@ -92,8 +92,6 @@ class Cloning(Algorithm):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         if state.get("demonstrations") != self._digest:
-            raise WorkbenchError(
-                "the demonstrations are others than those that this training began with"
-            )
+            raise WorkbenchError("the demonstrations are others than those that this training began with")
         with fitting("agent"):
             self._agent.load_state_dict(state["agent"])

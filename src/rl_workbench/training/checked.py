@@ -100,10 +100,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
                 self._sums[name] = total + float(value), count + 1
         if not is_last:
             return info
-        means = {
-            f"info/{_UNFIT.sub('_', str(name))}": total / n
-            for name, (total, n) in self._sums.items()
-        }
+        means = {f"info/{_UNFIT.sub('_', str(name))}": total / n for name, (total, n) in self._sums.items()}
         return {**info, CURVES: {tag: mean for tag, mean in means.items() if math.isfinite(mean)}}
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray, info: Any) -> np.ndarray:
@@ -145,9 +142,7 @@ class CheckedEnvironment(gymnasium.Wrapper[Any, Any, Any, Any]):
             return self._error(str(error) or type(error).__name__)
         if _OLD_GYM.search(str(error)) and not own_frames(error):
             return self._old_gym()
-        return EnvironmentFailure(
-            f"{self._which}{self._id} failed in {method}(): {error_line(error)}"
-        )
+        return EnvironmentFailure(f"{self._which}{self._id} failed in {method}(): {error_line(error)}")
 
     def _old_gym(self) -> WorkbenchError:
         return self._error(

@@ -121,9 +121,7 @@ class Recorder:
     def step(self, action: Any) -> Any:
         """Carries out an action; returns what is observed then."""
         taken = np.array(action, self._env.action_space.dtype)
-        observation, reward, terminated, truncated, info = self._env.step(
-            _as_taken(self._env, taken)
-        )
+        observation, reward, terminated, truncated, info = self._env.step(_as_taken(self._env, taken))
         self._actions.append(taken)
         self._rewards.append(float(reward))
         self._seen.append(_digest(self._env, observation))
@@ -185,9 +183,7 @@ def load(path: Path) -> Demonstration:
         header = json.loads(str(content[_HEADER]))
         if header.pop("form", None) != FORM:
             raise ValueError("it is of another version of this program")
-        episode = Demonstration(
-            **header, **{name: content[name] for name in set(content) - {_HEADER}}
-        )
+        episode = Demonstration(**header, **{name: content[name] for name in set(content) - {_HEADER}})
         kinds = (str, dict, str, int, bool | NoneType, bool, bool, dict)
         for field, kind in zip(fields(Demonstration), kinds, strict=False):
             if not isinstance(getattr(episode, field.name), kind):
@@ -202,15 +198,11 @@ def load_all(folder: Path) -> dict[Path, Demonstration]:
     """Reads the episodes of a folder, which have to be of one environment."""
     found = {path: load(path) for path in paths(folder)}
     if not found:
-        raise WorkbenchError(
-            f"{folder} has no demonstrations: {NAMES}, as `demonstrate` writes them"
-        )
+        raise WorkbenchError(f"{folder} has no demonstrations: {NAMES}, as `demonstrate` writes them")
     (first, one), *others = found.items()
     for path, other in others:
         if other.origin != one.origin:
-            raise WorkbenchError(
-                f"{path} is of another environment, or other options, than {first}"
-            )
+            raise WorkbenchError(f"{path} is of another environment, or other options, than {first}")
     return found
 
 
@@ -229,9 +221,7 @@ def replay(path: Path, episode: Demonstration, env: Env, exactly: bool = True) -
                 raise WorkbenchError(f"{path} goes another way in step {step}: other {name}{why}")
 
     if episode.actions.shape[1:] != env.action_space.shape:
-        raise WorkbenchError(
-            f"{path} has no actions of {env.action_space}: {episode.env_id} has changed"
-        )
+        raise WorkbenchError(f"{path} has no actions of {env.action_space}: {episode.env_id} has changed")
     observation, info = env.reset(seed=episode.seed)
     played = Played(copy.deepcopy(observation), None, 0.0, False, False, info)
     steps = len(episode.actions)
@@ -256,9 +246,7 @@ def replayed(folder: str, run: RunOptions, env: Env) -> Iterator[list[Played]]:
     Its wrapper and options may show other observations than were recorded.
     """
     if not folder:
-        raise WorkbenchError(
-            "--demos FOLDER names the demonstrations, as `demonstrate` writes them"
-        )
+        raise WorkbenchError("--demos FOLDER names the demonstrations, as `demonstrate` writes them")
     here = Origin(run.env_id, run.training_environment, run.wrapper)
     found = load_all(Path(folder))
     good = {path: each for path, each in found.items() if each.success is not False}

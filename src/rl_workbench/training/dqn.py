@@ -29,9 +29,7 @@ def make_agent(options: TrainingOptions, env: gymnasium.Env[Any, Any]) -> DQNAge
     return DQNAgent(options.hyperparameters, shape[0], actions, run.seed, run.device)
 
 
-def load_policy(
-    options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]
-) -> Policy:
+def load_policy(options: TrainingOptions, content: dict[str, Any], env: gymnasium.Env[Any, Any]) -> Policy:
     """Makes the policy of a checkpoint; see `algorithm`."""
     agent = make_agent(options, env)
     agent.load_policy_state(content)
@@ -41,9 +39,7 @@ def load_policy(
 class DQNTraining(Algorithm):
     """Steps the environment and lets the agent learn."""
 
-    def __init__(
-        self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: DQNAgent
-    ) -> None:
+    def __init__(self, options: TrainingOptions, env: gymnasium.Env[Any, Any], agent: DQNAgent) -> None:
         self._agent = agent
         self._seed, self._log_frequency = options.run.seed, options.run.log_frequency
         self._repeatable = RepeatableEnvironment(env)

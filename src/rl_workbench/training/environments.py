@@ -85,9 +85,7 @@ def _check_names(env_id: str, options: Mapping[str, Any]) -> None:
     for name, value in (spec.kwargs if spec else {}).items():
         is_code = isinstance(value, str) and _CODE.fullmatch(value)
         if is_code and options.get(name, value) != value:
-            raise WorkbenchError(
-                f"can't make {env_id}: its {name} is {value}; no option changes it"
-            )
+            raise WorkbenchError(f"can't make {env_id}: its {name} is {value}; no option changes it")
 
 
 def _suited(env: Env, env_id: str, keep_dict: bool) -> Env:
@@ -102,9 +100,7 @@ def _suited(env: Env, env_id: str, keep_dict: bool) -> Env:
     if keeps and (isinstance(space, spaces.Dict) or is_image(space)):
         return env
     if not space.is_np_flattenable:
-        raise WorkbenchError(
-            f"{env_id} observes {space}; agents learn only from vectors of numbers"
-        )
+        raise WorkbenchError(f"{env_id} observes {space}; agents learn only from vectors of numbers")
     return gymnasium.wrappers.FlattenObservation(env)
 
 
@@ -246,8 +242,7 @@ def discrete_actions(env: Env, env_id: str, algorithm: str) -> int:
     if isinstance(space, spaces.Box):
         fits = "reinforce, or Stable-Baselines3's ppo, a2c, sac, td3 or ddpg"
     raise WorkbenchError(
-        f"{algorithm} needs discrete actions, Discrete(n); {env_id} has {space}. "
-        f"--algo {fits}: these fit it"
+        f"{algorithm} needs discrete actions, Discrete(n); {env_id} has {space}. --algo {fits}: these fit it"
     )
 
 

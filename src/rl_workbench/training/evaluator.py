@@ -108,13 +108,9 @@ class Evaluator:
                 if not is_same:
                     raise
                 self._is_guest = True
-                say(
-                    f"evaluating in the training's environment, because a second one can't be made: {error}"
-                )
+                say(f"evaluating in the training's environment, because a second one can't be made: {error}")
 
-    def evaluate(
-        self, best: float, say: Say, is_last: bool = False
-    ) -> tuple[Evaluation, float] | None:
+    def evaluate(self, best: float, say: Say, is_last: bool = False) -> tuple[Evaluation, float] | None:
         """Plays greedy episodes; also returns the mean that ranks policies; None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is

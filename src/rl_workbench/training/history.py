@@ -151,9 +151,7 @@ class Outcome(NamedTuple):
 
     def failure_text(self, failure: WorkbenchError, saved_at: int) -> str:
         """Returns the line for a training that failed; its last checkpoint is of `saved_at`, -1 for none."""
-        text = (
-            f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
-        )
+        text = f"{failure}{_write_traceback(self.folder, failure)}; stopped after {self.steps} steps, "
         text += f"{len(self.history.returns)} episodes"
         if saved_at >= 0:
             until = "" if saved_at == self.steps else f" up to step {saved_at}"

@@ -34,12 +34,8 @@ class RunOptions:
     )
     seed: int = option(0, "seed of weights, exploration, environment and evaluation", 0, 2**31 - 1)
     num_envs: int = option(1, "number of environments to learn in at the same time", 1, 1024)
-    total_timesteps: int = option(
-        0, "length of the training [steps]; 0: no limit", 0, LARGEST_COUNT
-    )
-    episodes: int = option(
-        0, "length in episodes, if that comes first; 0: no limit", 0, LARGEST_COUNT
-    )
+    total_timesteps: int = option(0, "length of the training [steps]; 0: no limit", 0, LARGEST_COUNT)
+    episodes: int = option(0, "length in episodes, if that comes first; 0: no limit", 0, LARGEST_COUNT)
     stop_at_return: float | None = option(
         None, "end the training when a confirmed mean return reaches X", -1e18, 1e18, metavar="X"
     )
@@ -50,9 +46,7 @@ class RunOptions:
     device: str = option("cpu", "torch device, e.g. cpu or cuda")
     exp_name: str = option("", "part of the run folder's name; the algorithm's name by default")
     run_dir: str = option("", "a new or empty folder for all results (runs/ENV__EXP__SEED__TIME)")
-    eval_frequency: int = option(
-        10_000, "steps between evaluations; 0: only at the end", 0, LARGEST_COUNT
-    )
+    eval_frequency: int = option(10_000, "steps between evaluations; 0: only at the end", 0, LARGEST_COUNT)
     eval_episodes: int = option(10, "greedy episodes per evaluation", 1, 10**6)
     confirm_episodes: int = option(
         0,
@@ -63,9 +57,7 @@ class RunOptions:
     checkpoint_frequency: int = option(
         10_000, "steps between checkpoints; 0: only at start and end", 0, LARGEST_COUNT
     )
-    keep_checkpoints: int = option(
-        3, "how many of the newest checkpoints to keep; 0: all", 0, 10**6
-    )
+    keep_checkpoints: int = option(3, "how many of the newest checkpoints to keep; 0: all", 0, 10**6)
     log_frequency: int = option(500, "steps between logged points of losses/", 1, LARGEST_COUNT)
 
     def __post_init__(self) -> None:
@@ -155,9 +147,7 @@ def make_options(
     merged = until_the_steps({"exp_name": kind.name, **kind.defaults}, values)
     run = options.make(RunOptions, merged)
     if run.num_envs > 1 and not kind.learns_in_several:
-        raise WorkbenchError(
-            f"{kind.name} learns in one environment: num_envs must be 1, not {run.num_envs}"
-        )
+        raise WorkbenchError(f"{kind.name} learns in one environment: num_envs must be 1, not {run.num_envs}")
     return TrainingOptions(kind, run, options.make(kind.hyperparameters(), merged), resume)
 
 

@@ -42,9 +42,7 @@ class Progress(Callback):
         if self._stream.isatty():
             from tqdm import tqdm
 
-            self._bar = tqdm(
-                total=total, initial=done, unit=unit, file=self._stream, dynamic_ncols=True
-            )
+            self._bar = tqdm(total=total, initial=done, unit=unit, file=self._stream, dynamic_ncols=True)
 
     def on_step(self, training: Any) -> None:
         if self._counts_steps:

@@ -77,9 +77,7 @@ class Training:
             making.callback(close_all, self._envs)
             make = import_module(options.kind.implementation).make
             self._algorithm: Algorithm = make(options, self._envs)
-            self._evaluator = Evaluator(
-                options, self._algorithm, self._envs[0], interrupt.requested, tell
-            )
+            self._evaluator = Evaluator(options, self._algorithm, self._envs[0], interrupt.requested, tell)
             making.callback(self._evaluator.close)
             self._rescored, self._task = None, source_digest(self._envs[0])
             if self._resumed:
@@ -268,9 +266,7 @@ class Training:
     def _is_due(self, frequency: int) -> bool:
         """Returns whether the last stride passed a multiple: episodes and vectors jump over some."""
         steps = self._algorithm.steps
-        return (
-            bool(frequency) and steps // frequency > (steps - self._algorithm.stride) // frequency
-        )
+        return bool(frequency) and steps // frequency > (steps - self._algorithm.stride) // frequency
 
     def _update_clock(self) -> float:
         """Updates the history's seconds; returns those since this object was made."""
@@ -360,9 +356,7 @@ class Training:
         self._checkpoints.check_place()
         self._algorithm.export(self.folder)
 
-    def _tried(
-        self, action: Callable[[], object], failure: WorkbenchError | None
-    ) -> WorkbenchError | None:
+    def _tried(self, action: Callable[[], object], failure: WorkbenchError | None) -> WorkbenchError | None:
         """Returns the failure so far, or that of a final action."""
         try:
             action()

@@ -31,9 +31,7 @@ class LinkView:
         except ValueError as error:
             raise RobotEnvError(str(error)) from error
         places = [_of_link(robot, each.link) for each in query.links]
-        frames = [
-            None if each.frame in _WORLD else _of_link(robot, each.frame) for each in query.links
-        ]
+        frames = [None if each.frame in _WORLD else _of_link(robot, each.frame) for each in query.links]
         self._wanted = list(zip(keys, places, frames, strict=True))
 
     def __call__(self, joints: Mapping[str, JointState]) -> dict[str, Motion]:
@@ -69,14 +67,12 @@ def _twist(before: Pose, after: Pose) -> Twist:
 def _check(robot: Robot, query: StateQuery) -> None:
     unknown = {
         "contacts": query.contacts_of or query.all_contacts,
-        "models": query.all_models
-        or set(query.models) - ({robot.model} if robot.odometry else set()),
+        "models": query.all_models or set(query.models) - ({robot.model} if robot.odometry else set()),
     }
     for what, asked in unknown.items():
         if asked:
             raise RobotEnvError(
-                f"the task asks for {what}, which aren't known of a robot that isn't simulated"
-                f"{ONLY_REWARDED}"
+                f"the task asks for {what}, which aren't known of a robot that isn't simulated{ONLY_REWARDED}"
             )
     if query.links and not robot.links.fixed_base:
         raise RobotEnvError(

@@ -168,13 +168,9 @@ class Pilot:
     def _state(self, time: float, joints: Joints, sensors: Sensors) -> WorldState:
         motion = sensors.get(ODOMETRY)
         models = Models() if motion is None else Models({self._model: motion.values[ODOMETRY]})
-        return WorldState(
-            time, joints, dict(self._held), self._links(joints), models, sensors=sensors
-        )
+        return WorldState(time, joints, dict(self._held), self._links(joints), models, sensors=sensors)
 
-    def step(
-        self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS
-    ) -> dict[str, Command] | None:
+    def step(self, time: float, joints: Joints, sensors: Sensors = NO_SENSORS) -> dict[str, Command] | None:
         """Returns commands for a time since the beginning [s]; None if the task's episode would end."""
         task, state = self._task, self._state(time, joints, sensors)
         over = self._evaluator.is_terminal(state)

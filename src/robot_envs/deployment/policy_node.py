@@ -286,9 +286,7 @@ def run_node(
 ) -> None:
     """Makes this process a node, whose remappings `argv` has, and runs the `PolicyNode` that `make` makes."""
     if not node.master_is_up():
-        raise RobotEnvError(
-            f"there is no ROS master at {rosgraph.get_master_uri()}: start the robot's"
-        )
+        raise RobotEnvError(f"there is no ROS master at {rosgraph.get_master_uri()}: start the robot's")
     node.refuse_twin(name)
     rospy.init_node(os.path.basename(name), argv=["", *argv], disable_signals=True)
     try:

@@ -36,9 +36,7 @@ class JointListener:
         limits: Mapping[str, JointLimits],
         late: float = OFF,
     ) -> None:
-        self._names = {f"{model}::{name}": name for name in joints} | {
-            name: name for name in joints
-        }
+        self._names = {f"{model}::{name}": name for name in joints} | {name: name for name in joints}
         self._joints, self._limits, self._late = tuple(joints), limits, max(late, OFF)
         self._faults: dict[str, str] = {}  # by joint
         self._lock = threading.Lock()
@@ -71,9 +69,7 @@ class JointListener:
                 self._known[name] = JointState(*values), stamp, now
                 self._faults.pop(name, None)
 
-    def _fault(
-        self, name: str, ahead: float, position: float, velocity: float, effort: float
-    ) -> str:
+    def _fault(self, name: str, ahead: float, position: float, velocity: float, effort: float) -> str:
         if ahead > OFF or -ahead > self._late:
             when = f"{ahead:.1f} s in the future" if ahead > 0.0 else f"{-ahead:.1f} s in the past"
             why = "" if ahead > 0.0 else ", or they are held up"

@@ -47,9 +47,7 @@ class RobotPicture:
     ) -> None:
         for side in (width, height):
             if not 1 <= side <= LARGEST_PICTURE or side != int(side):
-                raise ValueError(
-                    f"a picture's width and height lie in [1, {LARGEST_PICTURE}], not {side}"
-                )
+                raise ValueError(f"a picture's width and height lie in [1, {LARGEST_PICTURE}], not {side}")
         self._size = (int(width), int(height))
         if isinstance(camera, Mapping):
             Camera().changed(camera)
@@ -78,9 +76,7 @@ class RobotPicture:
             renderer.add(name, shapes)
         return placement, placement.camera(self._camera, self._size[0] / self._size[1]), renderer
 
-    def draw_on(
-        self, server: "ViserServer", positions: Callable[[], Mapping[str, float]]
-    ) -> "RobotOnPage":
+    def draw_on(self, server: "ViserServer", positions: Callable[[], Mapping[str, float]]) -> "RobotOnPage":
         """Draws the robot on a viser page, where `positions` puts it; see `RobotEnv.draw_on`."""
         from robot_envs.pictures.page import RobotOnPage
 

@@ -83,10 +83,7 @@ class Surroundings:
 def _flag(radius: float) -> Shapes:
     """Returns a disc on the floor, as wide as what counts as there [m], and a pole that is seen from afar."""
     sizes = ((radius, THICK), (POLE, TALL))
-    return [
-        (GOAL, Shape("cylinder", size, Pose((0.0, 0.0, size[1] / 2.0)), rgba=PINK))
-        for size in sizes
-    ]
+    return [(GOAL, Shape("cylinder", size, Pose((0.0, 0.0, size[1] / 2.0)), rgba=PINK)) for size in sizes]
 
 
 QUARTERS = (0.0, pi / 2.0, pi, -pi / 2.0)  # [rad] of a joint without stops

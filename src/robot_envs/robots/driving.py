@@ -256,9 +256,7 @@ def _boxes(model: ModelDescription) -> Iterator[tuple[float, ...]]:
             if shape.kind not in ("box", "cylinder", "sphere"):
                 continue
             is_box = shape.kind == "box"
-            along, across = (
-                (0.5 * shape.size[0], 0.5 * shape.size[1]) if is_box else shape.size[:1] * 2
-            )
+            along, across = (0.5 * shape.size[0], 0.5 * shape.size[1]) if is_box else shape.size[:1] * 2
             pose = place.compose(shape.pose)
             x, y, _ = pose.position
             if not model.fixed_base or model.movable_joints:

@@ -60,9 +60,7 @@ class SwingUp(Task):
 
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         arm, arm_speed, rod, rod_speed = (float(each) for each in rng.uniform(-0.1, 0.1, 4))
-        return InitialState(
-            joints={"arm_joint": (arm, arm_speed), "rod_joint": (math.pi + rod, rod_speed)}
-        )
+        return InitialState(joints={"arm_joint": (arm, arm_speed), "rod_joint": (math.pi + rod, rod_speed)})
 
     def apply(self, action: np.ndarray, state: WorldState) -> dict[str, float]:
         return {"arm_controller": STRONGEST * float(action[0])}

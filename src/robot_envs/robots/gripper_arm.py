@@ -147,9 +147,7 @@ class PickCube(Picking):
         wanted = state.commands["gripper_controller"][0]
         closed = (OPEN - wanted) / (OPEN - SHUT) if float(np.linalg.norm(way)) < NEAR else 0.0
         height = float(cube[2] - ON_TABLE)
-        return (
-            0.5 * math.exp(-funnel(way) / 0.1) + 0.5 * closed + min(max(height / LIFTED, 0.0), 1.2)
-        )
+        return 0.5 * math.exp(-funnel(way) / 0.1) + 0.5 * closed + min(max(height / LIFTED, 0.0), 1.2)
 
     def info(self, state: WorldState) -> dict[str, Any]:
         height = float(places(state)[1][2] - ON_TABLE)

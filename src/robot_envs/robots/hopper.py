@@ -82,10 +82,7 @@ class HopForward(Task):
             up.velocity,
             pitch.position / 0.3,
             pitch.velocity / 3.0,
-            *(
-                (each[name].position - stance) / 0.5
-                for name, stance in zip(LEG, STANCE, strict=True)
-            ),
+            *((each[name].position - stance) / 0.5 for name, stance in zip(LEG, STANCE, strict=True)),
             *(each[name].velocity / 10.0 for name in LEG),
             1.0 if state.contacts else 0.0,
         ]

@@ -68,8 +68,7 @@ class ReachInSpace(Task):
     def initial_state(self, rng: np.random.Generator) -> InitialState:
         """Draws a pose, and the target."""
         x, y, z = (
-            float(middle + half * rng.uniform(-1.0, 1.0))
-            for middle, half in zip(CENTRE, HALF, strict=True)
+            float(middle + half * rng.uniform(-1.0, 1.0)) for middle, half in zip(CENTRE, HALF, strict=True)
         )
         self.target = (x, y, z)
         pose = np.add(HOME, rng.uniform(-0.3, 0.3, 6)).tolist()

@@ -185,9 +185,7 @@ class WalkByCommand(Task):
         length = self.max_steps * self.robot.control_period / COMMANDS
         shoves = rng.uniform(0.0, (self.shove, math.tau, length), (COMMANDS, 3)).tolist()
         pushes = [
-            Push(
-                trunk, (force * math.cos(way), force * math.sin(way), 0.0), i * length + at, SHOVED
-            )
+            Push(trunk, (force * math.cos(way), force * math.sin(way), 0.0), i * length + at, SHOVED)
             for i, (force, way, at) in enumerate(shoves)
             if force
         ]
@@ -255,11 +253,7 @@ class WalkByCommand(Task):
 
     def touching(self, state: WorldState) -> list[bool]:
         """Returns which feet touch something."""
-        links = {
-            name.rpartition("::")[0]
-            for each in state.contacts
-            for name in (each.first, each.second)
-        }
+        links = {name.rpartition("::")[0] for each in state.contacts for name in (each.first, each.second)}
         return [f"{self.robot.model}::{foot}" in links for foot in self.feet]
 
     def terms(self, state: WorldState, velocity: np.ndarray | Vector) -> dict[str, float]:

@@ -78,9 +78,7 @@ def observations(subject: Subject) -> None:
         for at, given in enumerate(rollout(env, subject.steps, seed=1)):
             seen = given[0]
             wrong = outside(env.observation_space, seen)
-            assert not wrong, (
-                f"observation {at} of a rollout isn't in the observation space: {wrong}"
-            )
+            assert not wrong, f"observation {at} of a rollout isn't in the observation space: {wrong}"
             for array in numbers(seen):
                 finite = array.dtype.kind != "f" or np.isfinite(array).all()
                 assert finite, f"observation {at} of a rollout isn't finite: {seen!r}"
@@ -113,9 +111,7 @@ def ends(subject: Subject) -> None:
         for seed in range(TRIES):
             env.reset(seed=seed)
             _, _, terminated, truncated, _ = env.step(action)
-            assert terminated or truncated, (
-                "an episode with max_steps=1 continues after its first step"
-            )
+            assert terminated or truncated, "an episode with max_steps=1 continues after its first step"
             assert not (terminated and truncated), "an episode is terminated and truncated at once"
             cut = cut or truncated
             behind = "step() behind an episode's end"
@@ -208,9 +204,9 @@ def pictures(subject: Subject) -> None:
         env.action_space.seed(4)
         env.reset(seed=4)
         first = env.render()
-        assert (
-            isinstance(first, np.ndarray) and first.shape == (64, 96, 3) and first.dtype == np.uint8
-        ), "render() with width 96 and height 64 gives no array of uint8 of the shape (64, 96, 3)"
+        assert isinstance(first, np.ndarray) and first.shape == (64, 96, 3) and first.dtype == np.uint8, (
+            "render() with width 96 and height 64 gives no array of uint8 of the shape (64, 96, 3)"
+        )
         for _ in range(subject.steps):
             _, _, terminated, truncated, _ = env.step(env.action_space.sample())
             if terminated or truncated:
@@ -276,9 +272,7 @@ def _check_own_goal(env: Any) -> None:
         f'reset(options={{"goal": {wanted}}}) has the desired goal {seen["desired_goal"]}'
     )
     wrong = np.full_like(wanted, np.nan)
-    expect_error(
-        lambda: env.reset(options={"goal": wrong}), "reset() with a goal of NaN", ValueError
-    )
+    expect_error(lambda: env.reset(options={"goal": wrong}), "reset() with a goal of NaN", ValueError)
 
 
 def _near(one: Any, other: Any) -> bool:

@@ -47,15 +47,11 @@ def two_phases(subject: Subject) -> None:
         env.reset(seed=SEED)
         action = env.action_space.sample()
         env.begin_step(action)
-        expect_error(
-            lambda: env.begin_step(action), "begin_step() once more before step()", ValueError
-        )
+        expect_error(lambda: env.begin_step(action), "begin_step() once more before step()", ValueError)
         samples = (env.action_space.sample() for _ in range(TRIES))
         other = next((each for each in samples if not same(each, action)), None)
         if other is not None:
-            expect_error(
-                lambda: env.step(other), "step() with another action than was begun", ValueError
-            )
+            expect_error(lambda: env.step(other), "step() with another action than was begun", ValueError)
         again = rollout(env, subject.steps, SEED, two_phases=True)
         env.begin_step(action)  # dropped by close()
         difference = differences(first, again) if env.backend.deterministic else ""

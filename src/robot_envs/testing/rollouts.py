@@ -49,9 +49,7 @@ def expect_error(call: Callable[[], Any], what: str, *kinds: type[Exception]) ->
         return
     except Exception as error:
         text = " ".join(str(error).split())
-        raise AssertionError(
-            f"{what} raises {type(error).__name__} ({text}), not {wanted}"
-        ) from error
+        raise AssertionError(f"{what} raises {type(error).__name__} ({text}), not {wanted}") from error
     raise AssertionError(f"{what} raises nothing, and not {wanted}")
 
 
@@ -98,9 +96,7 @@ def same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
         fits = one.dtype == other.dtype and one.shape == other.shape
         return fits and (
-            one.tolist() == other.tolist()
-            if one.dtype == object
-            else one.tobytes() == other.tobytes()
+            one.tolist() == other.tolist() if one.dtype == object else one.tobytes() == other.tobytes()
         )
     if isinstance(one, Mapping):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)

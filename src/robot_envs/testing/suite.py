@@ -65,9 +65,7 @@ def check_robot_env(
     if faults:
         listed = "".join(f"\n- {each}" for each in faults)
         others = (each for each in faults.values() if not isinstance(each, AssertionError))
-        raise AssertionError(f"{subject.identifier or 'the environment'}:{listed}") from next(
-            others, None
-        )
+        raise AssertionError(f"{subject.identifier or 'the environment'}:{listed}") from next(others, None)
 
 
 def gymnasiums_checker(subject: Subject) -> None:
@@ -99,9 +97,7 @@ CHECKS: tuple[Callable[[Subject], None], ...] = (
 )
 
 
-def _run(
-    check: Callable[..., None], where: str, faults: dict[str, Exception], *subjects: Subject
-) -> None:
+def _run(check: Callable[..., None], where: str, faults: dict[str, Exception], *subjects: Subject) -> None:
     """Runs a check, and adds its failure or error to the faults."""
     name = f"{check.__name__.replace('_', ' ')} ({where})"
     try:

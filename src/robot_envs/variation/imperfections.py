@@ -22,9 +22,7 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def by_name(
-    option: str, given: Any, names: Sequence[str], kind: str, which: str = ""
-) -> dict[str, Any]:
+def by_name(option: str, given: Any, names: Sequence[str], kind: str, which: str = "") -> dict[str, Any]:
     """Returns an option's values by name: one for all, or a mapping; ValueError for an unknown name."""
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, given)
@@ -51,9 +49,7 @@ def _sizes(option: str, given: Any, names: Sequence[str], kind: str) -> dict[str
 def steps(option: str, given: Any, most: int) -> int:
     """Returns `given` as a number of control steps; raises ValueError for anything else."""
     if not is_number(given) or not 0 <= given <= most or given != int(given):
-        raise ValueError(
-            f"{option} must be a number of control steps from 0 to {most}, not {given!r}"
-        )
+        raise ValueError(f"{option} must be a number of control steps from 0 to {most}, not {given!r}")
     return int(given)
 
 
@@ -203,9 +199,7 @@ class Sensor:
         self._readings[name] = (reading.time, noisy)
         return noisy
 
-    def _measured(
-        self, name: str, encoder: Encoder, position: float, velocity: float
-    ) -> tuple[float, float]:
+    def _measured(self, name: str, encoder: Encoder, position: float, velocity: float) -> tuple[float, float]:
         """Returns what an encoder measures; joints are taken to have moved steadily before the episode."""
         measured = encoder.rounded(position)
         before = self._before.get(name)
@@ -260,8 +254,7 @@ class Actuator:
         self._delay = steps("action_delay", delay, MOST_DELAY)
         most = {} if limit is None else _sizes("actuator_limit", limit, names, "controller")
         self._limits: Rules = {
-            name: (_follow, each * period) if holds[name] else (_cut, each)
-            for name, each in most.items()
+            name: (_follow, each * period) if holds[name] else (_cut, each) for name, each in most.items()
         }
         lags = _sizes("actuator_lag", lag, names, "controller")
         self._lags: Rules = {

@@ -75,23 +75,17 @@ def ranges(option: Option, given: Any, names: Sequence[str]) -> dict[str, Unifor
     if option.of == WORLD:
         raise ValueError(f"randomisation of {option.name} is one for the world, not {dict(given)}")
     values = by_name(f"randomisation of {option.name}", given, names, *option.of)
-    return {
-        name: _range(option, value, f"{option.name} of '{name}'") for name, value in values.items()
-    }
+    return {name: _range(option, value, f"{option.name} of '{name}'") for name, value in values.items()}
 
 
 def _range(option: Option, given: Any, what: str) -> UniformRange:
     numbers = list(given) if isinstance(given, (Sequence, np.ndarray)) else [given]
     if len(numbers) not in (1, 2) or not all(map(is_number, numbers)):
-        raise ValueError(
-            f"randomisation of {what} is a number or a pair (low, high), not {given!r}"
-        )
+        raise ValueError(f"randomisation of {what} is a number or a pair (low, high), not {given!r}")
     if len(numbers) == 1:
         size = numbers[0]
         if size < 0.0:
-            raise ValueError(
-                f"randomisation of {what} is one number: it must be >= 0, not {given!r}"
-            )
+            raise ValueError(f"randomisation of {what} is one number: it must be >= 0, not {given!r}")
         numbers = [option.nominal - size * option.either_way, option.nominal + size]
     low, high = map(float, numbers)
     least, most = option.least, option.most
@@ -174,9 +168,7 @@ class UniformRandomisation(Shared):
         }
 
     def _scale(self, link: str, drawn: Drawn) -> LinkScale:
-        given = {
-            key: drawn[key][link] for key in ("mass", "length", "com") if link in drawn.get(key, ())
-        }
+        given = {key: drawn[key][link] for key in ("mass", "length", "com") if link in drawn.get(key, ())}
         return LinkScale(**given, axis=self._axes[link])
 
 
@@ -195,7 +187,4 @@ def _reported(drawn: Any) -> Any:
     """Returns a copy with arrays for several numbers, which vectors of environments can stack."""
     if not isinstance(drawn, Mapping):
         return drawn
-    return {
-        name: np.array(value) if isinstance(value, tuple) else value
-        for name, value in drawn.items()
-    }
+    return {name: np.array(value) if isinstance(value, tuple) else value for name, value in drawn.items()}

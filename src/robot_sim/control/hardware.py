@@ -188,9 +188,7 @@ class RobotHardware(Shared):
     once their `enforcers` have clipped them; `drives` move the other joints.
     """
 
-    def __init__(
-        self, description: RobotDescription, gains: Mapping[str, object] | None = None
-    ) -> None:
+    def __init__(self, description: RobotDescription, gains: Mapping[str, object] | None = None) -> None:
         """`gains` are the parameters `<ns>/gazebo_ros_control/pid_gains`: joints by name."""
         self.robot = description.robot
         self.interfaces: dict[str, dict[str, JointHandle]] = {}
@@ -223,9 +221,7 @@ class RobotHardware(Shared):
     def loops(self) -> list[Loop]:
         """The PIDs of the drives as loops."""
         return [
-            Loop(d.joint.name, d.pid, isinstance(d, VelocityDrive))
-            for d in self.drives
-            if d.pid is not None
+            Loop(d.joint.name, d.pid, isinstance(d, VelocityDrive)) for d in self.drives if d.pid is not None
         ]
 
     def state_dict(self) -> dict[str, Any]:
@@ -262,9 +258,7 @@ class RobotHardware(Shared):
                 f"hardware_interface::{interface}: its type and the joint's <transmission> must agree"
             )
         known = ", ".join(sorted(joints)) or "none"
-        raise ControlError(
-            f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})"
-        )
+        raise ControlError(f"joint '{name}' is not in hardware_interface::{interface} (it has: {known})")
 
     def relatch(self, names: Iterable[str] | None = None) -> None:
         """Forgets the commands of joints (default: all).

@@ -80,15 +80,11 @@ class PositionLimiter(Stateful):
         last = joint.position if self._last is None else self._last
         soft = self._limits.soft
         speed = _or_unlimited(self._limits.velocity)
-        slowest, fastest = (
-            (-speed, speed) if soft is None else _soft_speeds(self._limits, soft, last)
-        )
+        slowest, fastest = (-speed, speed) if soft is None else _soft_speeds(self._limits, soft, last)
         low = max(last + slowest * dt, self._lower)
         high = min(last + fastest * dt, self._upper)
         # If the joint is beyond its range the two bounds may cross: then the range counts.
-        self._last = joint.command = clamp(
-            clamp(joint.command, low, high), self._lower, self._upper
-        )
+        self._last = joint.command = clamp(clamp(joint.command, low, high), self._lower, self._upper)
 
 
 class VelocityLimiter(Stateful):

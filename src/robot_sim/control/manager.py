@@ -93,9 +93,7 @@ class ControllerManager:
         self.version += 1
         del self._controllers[name]
 
-    def switch(
-        self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT
-    ) -> None:
+    def switch(self, start: Iterable[str], stop: Iterable[str], strictness: int = BEST_EFFORT) -> None:
         """Stops and starts controllers at once, also while the world is paused.
 
         A running controller that is in both lists, or in the start list under BEST_EFFORT, is restarted;
@@ -212,15 +210,11 @@ def _check_made(controller: object, name: str, hardware: RobotHardware) -> None:
     if not isinstance(controller, Controller):
         raise ControlError(f"create() returned {controller!r}, which isn't a controller")
     if controller.name != name:
-        raise ControlError(
-            f"it calls itself {controller.name!r}: __init__ must get create()'s name"
-        )
+        raise ControlError(f"it calls itself {controller.name!r}: __init__ must get create()'s name")
     if not isinstance(getattr(controller, "interface", None), str):
         raise ControlError("its class lacks `interface`, the name of a hardware interface")
     claimed = controller.claimed
-    if not isinstance(claimed, (tuple, list)) or not all(
-        name in hardware.joints for name in claimed
-    ):
+    if not isinstance(claimed, (tuple, list)) or not all(name in hardware.joints for name in claimed):
         raise ControlError(
             f"it claims {claimed!r}, which isn't a tuple of names of controlled joints "
             f"({', '.join(hardware.joints) or 'there are none'})"

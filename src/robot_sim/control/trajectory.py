@@ -163,9 +163,7 @@ class Axis(Stateful):
         "desired", "joint", "position_error", "pid", "velocity_error", "spline", "velocity_ff",
     )  # fmt: skip
 
-    def __init__(
-        self, joint: JointHandle, pid: Pid | None = None, velocity_ff: float = 0.0
-    ) -> None:
+    def __init__(self, joint: JointHandle, pid: Pid | None = None, velocity_ff: float = 0.0) -> None:
         self.joint = joint
         self.pid = pid
         self.velocity_ff = velocity_ff

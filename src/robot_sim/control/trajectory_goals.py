@@ -107,9 +107,7 @@ def _fault(point: TrajectoryPoint, joints: int) -> str:
     for what, values in zip(point._fields[1:], point[1:], strict=True):
         if values and len(values) != joints:
             return f"it has {len(values)} {what} for {joints} joints"
-        bad = [
-            value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST_VALUE)
-        ]
+        bad = [value for value in values if not (math.isfinite(value) and abs(value) <= LARGEST_VALUE)]
         if bad:
             return f"its {what} must be finite and within {LARGEST_VALUE:g}: {bad[0]}"
     return ""
@@ -207,9 +205,7 @@ class Goal:
             if uptime < axis.spline.end:
                 reached = False
                 fault = (
-                    path.violation(axis.position_error, axis.velocity_error)
-                    if uptime >= self.start
-                    else ""
+                    path.violation(axis.position_error, axis.velocity_error) if uptime >= self.start else ""
                 )
                 if fault:
                     return _aborted(PATH_TOLERANCE_VIOLATED, axis, "path", fault)
@@ -228,6 +224,4 @@ def check_tolerances(request: GoalRequest) -> None:
 
 
 def _aborted(code: int, axis: Axis, where: str, fault: str) -> GoalOutcome:
-    return GoalOutcome(
-        ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})"
-    )
+    return GoalOutcome(ABORTED, code, f"{axis.joint.name} {where} error {axis.position_error:f} ({fault})")

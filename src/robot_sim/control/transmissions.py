@@ -158,9 +158,7 @@ def _float(element: Element, key: str) -> float:
     try:
         value = float(text)
     except ValueError as error:
-        raise ControlError(
-            f"robot_description: <{element.tag} {key}='{text}'> is not a number"
-        ) from error
+        raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not a number") from error
     if not math.isfinite(value):
         raise ControlError(f"robot_description: <{element.tag} {key}='{text}'> is not finite")
     return value
@@ -193,9 +191,7 @@ def _transmission(element: Element, warnings: list[str]) -> Transmission | None:
         return None
     joint = joints[0].get("name", "")
     if len(interfaces) > 1:
-        warnings.append(
-            f"Joint '{joint}' has several hardware interfaces; {interfaces[0]} is used."
-        )
+        warnings.append(f"Joint '{joint}' has several hardware interfaces; {interfaces[0]} is used.")
     return Transmission(joint, _interface(interfaces[0], joint, warnings))
 
 

@@ -26,9 +26,7 @@ class Ramp(Stateful):
         """Begins from rest."""
         self._issued = [0.0] * len(self._issued)
 
-    def next(
-        self, targets: Sequence[float], measured: Sequence[float], seconds: float
-    ) -> list[float]:
+    def next(self, targets: Sequence[float], measured: Sequence[float], seconds: float) -> list[float]:
         """Returns the speeds to issue, given the wanted and the measured ones [m/s], each some time [s]."""
         gaps = [target - speed for target, speed in zip(targets, measured, strict=True)]
         if self._acceleration <= 0.0 or any(abs(gap) < NEAR for gap in gaps):
@@ -108,9 +106,7 @@ class SteeredWheels:
         levers = [x * math.sin(angle) - y * math.cos(angle) for (x, y), _, angle in wheels]
         # What each pivot moves by along its wheel is the wheel's speed and `outside` times the turn.
         outside = [math.copysign(self.offset, y) for (_, y), _, _ in wheels]
-        moments = math.fsum(
-            lever * speed for lever, (_, speed, _) in zip(levers, wheels, strict=True)
-        )
+        moments = math.fsum(lever * speed for lever, (_, speed, _) in zip(levers, wheels, strict=True))
         inertia = self.base**2 + self.track**2
         inertia -= math.fsum(lever * arm for lever, arm in zip(levers, outside, strict=True))
         turn = moments / inertia

@@ -316,10 +316,7 @@ class ModelDescription:
 
     def pairs_that_collide(self) -> list[tuple[Link, Link]]:
         """Returns links that can meet (SDF's rule): either wants it and no joint connects them."""
-        joined = {
-            frozenset((joint.parent, self.links[joint.child].owner))
-            for joint in self.joints.values()
-        }
+        joined = {frozenset((joint.parent, self.links[joint.child].owner)) for joint in self.joints.values()}
         solid = [link for link in self.links.values() if link.collisions]
         return [
             (a, b)

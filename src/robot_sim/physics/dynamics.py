@@ -69,9 +69,7 @@ def tensor_in(inertia: Inertia, orientation: Quaternion) -> np.ndarray:
     return rotation @ _tensor(inertia) @ rotation.T
 
 
-def link_poses(
-    model: ModelDescription, root: Pose, positions: Mapping[str, float]
-) -> dict[str, Pose]:
+def link_poses(model: ModelDescription, root: Pose, positions: Mapping[str, float]) -> dict[str, Pose]:
     """Returns the frame of every link, in the frame in which `root`, the root link's, is given.
 
     `positions` are those of the movable joints [rad, m]; a joint that isn't named is at zero.
@@ -151,9 +149,7 @@ def most_inertias(model: ModelDescription) -> dict[str, float]:
     return {joint.name: _stretched(inertias, below, joint) for joint in model.movable_joints}
 
 
-def _stretched(
-    inertias: Mapping[str, Inertia | None], below: Mapping[str, list[Joint]], top: Joint
-) -> float:
+def _stretched(inertias: Mapping[str, Inertia | None], below: Mapping[str, list[Joint]], top: Joint) -> float:
     total, todo = 0.0, [(top.child, float(np.linalg.norm(top.anchor.position)))]
     for name, reach in todo:
         inertia = inertias[name]

@@ -169,9 +169,7 @@ class Engine(ABC):
         Raises DescriptionError if the engine can't take it.
         """
 
-    def load_all(
-        self, models: Sequence[tuple[ModelDescription, Pose]]
-    ) -> Iterator[Body | DescriptionError]:
+    def load_all(self, models: Sequence[tuple[ModelDescription, Pose]]) -> Iterator[Body | DescriptionError]:
         """Adds models in order; yields each one's body, or why the engine can't take it."""
         for description, pose in models:
             try:

@@ -45,9 +45,7 @@ def check_shapes(links: Iterable[Link]) -> None:
     """Refuses links with too many shapes, before lumping, which would take long, and after it."""
     shapes = sum(len(link.collisions) + len(link.visuals) for link in links)
     if shapes > MOST_SHAPES:
-        raise DescriptionError(
-            f"it has {shapes} collisions and visuals; up to {MOST_SHAPES} are taken"
-        )
+        raise DescriptionError(f"it has {shapes} collisions and visuals; up to {MOST_SHAPES} are taken")
 
 
 def _check_link(link: Link, static: bool) -> None:
@@ -111,9 +109,7 @@ def at_joints(model: ModelDescription) -> tuple[ModelDescription, dict[str, Pose
         model = rigid(model)
     check_bounds(model)
     offsets = {
-        joint.child: joint.anchor.inverse()
-        for joint in model.joints.values()
-        if joint.anchor != Pose()
+        joint.child: joint.anchor.inverse() for joint in model.joints.values() if joint.anchor != Pose()
     }
     if model.loops:  # helpers that close them have shares of links' inertias
         inertias = model.inertias()
@@ -178,9 +174,7 @@ def parents_first(model: ModelDescription) -> ModelDescription:
 
 def rigid(model: ModelDescription) -> ModelDescription:
     """Returns a static model with all joints fixed, and its islands fixed to the root."""
-    joints = {
-        name: replace(joint, kind="fixed", anchor=Pose()) for name, joint in model.joints.items()
-    }
+    joints = {name: replace(joint, kind="fixed", anchor=Pose()) for name, joint in model.joints.items()}
     for link, pose in model.islands.items():
         name = f"{link}::island"
         joints[name] = Joint(name, "fixed", model.root, link, pose)

@@ -76,9 +76,7 @@ def _reversed(joint: Joint) -> Joint:
     )  # fmt: skip
 
 
-def _close(
-    links: dict[str, Link], joints: dict[str, Joint], joint: Joint, warnings: list[str]
-) -> None:
+def _close(links: dict[str, Link], joints: dict[str, Joint], joint: Joint, warnings: list[str]) -> None:
     """Hangs a helper link from a joint in place of its child, which something else carries."""
     if joint.parent == joint.child:
         raise DescriptionError(f"joint '{joint.name}' joins link '{joint.child}' to itself")

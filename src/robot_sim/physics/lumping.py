@@ -69,9 +69,7 @@ def check_links(links: dict[str, Link], joints: dict[str, Joint]) -> None:
     if not links:
         raise DescriptionError("there is no <link>")
     if len(links) > MAX_LINKS:
-        raise DescriptionError(
-            f"there are {len(links)} links; up to {MAX_LINKS} are read (MAX_LINKS)"
-        )
+        raise DescriptionError(f"there are {len(links)} links; up to {MAX_LINKS} are read (MAX_LINKS)")
     for joint in joints.values():
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
@@ -210,17 +208,13 @@ def drop_massless(model: ModelDescription) -> None:
         if link is None or name == WORLD or (link.inertia is not None and link.inertia.mass > 0.0):
             continue
         if name == model.root and not model.static:
-            raise DescriptionError(
-                f"link '{name}': the root link has no mass, so Gazebo drops the model"
-            )
+            raise DescriptionError(f"link '{name}': the root link has no mass, so Gazebo drops the model")
         if name != model.root:
             _drop_subtree(model, link)
 
 
 def _drop_subtree(model: ModelDescription, link: Link) -> None:
-    model.warnings.append(
-        f"link '{link.name}' has no mass: it is dropped with all that hangs from it"
-    )
+    model.warnings.append(f"link '{link.name}' has no mass: it is dropped with all that hangs from it")
     doomed = [link.name]
     while doomed:
         name = doomed.pop()

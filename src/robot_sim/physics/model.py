@@ -142,9 +142,7 @@ class Model(Shared):
         for name, mimic in self.description.mimics.items():
             position, velocity = self.joint_state(mimic.driver)
             wanted = mimic.multiplier * position + mimic.offset
-            self.body.reset_joint(
-                self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity
-            )
+            self.body.reset_joint(self._joints[name], self.clamped(name, wanted), mimic.multiplier * velocity)
 
     def close_loops(self, held: Collection[str], before: Sequence[Sequence[float]]) -> None:
         """Puts the joints of loops so that these close, the `held` ones where they are.
@@ -212,9 +210,7 @@ class Model(Shared):
         """
         self.time_step = time_step
         joints = self.description.joints
-        dampings = {
-            name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints
-        }
+        dampings = {name: joints[name].damping + self.damping_added.get(name, 0.0) for name in self._joints}
         sprung = {name for name in self._joints if joints[name].spring_stiffness > 0.0}
         damped = {name for name, damping in dampings.items() if damping > 0.0} | sprung
         if not damped | set(self._damped):

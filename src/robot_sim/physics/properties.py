@@ -31,17 +31,13 @@ def link_inertia(model: Model, link: str) -> Inertia:
     return model.description.links[link].inertia or GAZEBO_INERTIA
 
 
-def set_link_properties(
-    world: World, model: Model, link: str, inertia: Inertia, gravity: bool
-) -> None:
+def set_link_properties(world: World, model: Model, link: str, inertia: Inertia, gravity: bool) -> None:
     """Sets a link's inertia and gravity mode. They have no effect on a static model.
 
     Raises PropertyError if no body can have them; nothing changes then.
     """
     if not is_positive_definite(inertia):
-        raise PropertyError(
-            f"mass {inertia.mass} and inertia of '{link}' must be positive (definite)"
-        )
+        raise PropertyError(f"mass {inertia.mass} and inertia of '{link}' must be positive (definite)")
     if inertia != model.description.links[link].inertia:
         world.set_inertia(model, link, inertia)
     record = model.description.links[link]
@@ -49,9 +45,7 @@ def set_link_properties(
     model.body.set_link_gravity(link, record.weighs)
 
 
-def set_joint_properties(
-    model: Model, name: str, wanted: JointProperties, time_step: float
-) -> None:
+def set_joint_properties(model: Model, name: str, wanted: JointProperties, time_step: float) -> None:
     """Changes a joint's damping, stops and motor, as far as they are given.
 
     Raises PropertyError if no joint can have them; nothing changes then.

@@ -70,9 +70,7 @@ class NameTaken(ValueError):
 class World(Shared):
     """All models, and the engine that simulates them. Not thread-safe: its owner serialises access."""
 
-    def __init__(
-        self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP
-    ) -> None:
+    def __init__(self, engine: Engine, gravity: Vector = GRAVITY, time_step: float = TIME_STEP) -> None:
         self.engine = engine
         self.models: dict[str, Model] = {}
         self.lights: dict[str, Light] = {}
@@ -249,11 +247,7 @@ class World(Shared):
             return
         for model in self._special:
             passive_forces.apply(model)
-        held = [
-            (model, passive_forces.kinematic_twist(model))
-            for model in self._special
-            if model.kinematic
-        ]
+        held = [(model, passive_forces.kinematic_twist(model)) for model in self._special if model.kinematic]
         self.engine.step()
         for model, twist in held:
             passive_forces.set_kinematic_twist(model, twist)
@@ -295,8 +289,7 @@ class World(Shared):
             ],
             "fastened": fastened,
             "contacts": [
-                (*each[:5], *((names[id(side.body)], *side[1:]) for side in each[5:]))
-                for each in contacts
+                (*each[:5], *((names[id(side.body)], *side[1:]) for side in each[5:])) for each in contacts
             ],
         }
         self._recall(contacts)

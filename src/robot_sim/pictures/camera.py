@@ -60,9 +60,7 @@ class Camera:
             fits = found.shape == np.shape(like) and found.dtype.kind in "bif"
             fits = fits and (isinstance(value, bool) or not isinstance(like, bool))
             if not fits or (np.clip(found, low, high) != found).any():
-                raise ValueError(
-                    f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}"
-                )
+                raise ValueError(f"a camera's {name} is like {like}, in [{low:g}, {high:g}]: {value!r}")
         given: Any = {name: tuple(v) if name == "target" else v for name, v in fields.items()}
         return replace(self, **given)
 

@@ -21,9 +21,7 @@ RED = (220, 30, 30)
 class Picture:
     """Draws models below a scene node, and warns of what can't be shown. Not thread-safe."""
 
-    def __init__(
-        self, server: viser.ViserServer, warn: Callable[[str], None], below: str = ""
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, warn: Callable[[str], None], below: str = "") -> None:
         self._server, self._below = server, below
         self._batches = Batches(server.scene, below)
         self._singles = Singles(below)

@@ -69,9 +69,7 @@ class Batches:
     def add(self, look: Appearance, instance: Instance) -> None:
         """Adds an instance; it is drawn with the next `move` after `settle`."""
         batches = self._batches[look]
-        batch = next(
-            (each for each in reversed(batches) if len(each.entries) < MOST_INSTANCES), None
-        )
+        batch = next((each for each in reversed(batches) if len(each.entries) < MOST_INSTANCES), None)
         if batch is None:
             self._made += 1
             batch = _Batch(self._scene, f"{self._below}/batch{self._made}", look)
@@ -120,9 +118,7 @@ class _Batch:
 
     def settle(self, first: dict[int, int]) -> None:
         self._rows = np.array([first[model] + link for (model, link), *_ in self.entries])
-        self._inner = np.array(
-            [(*pose.position, *pose.orientation) for _, pose, *_ in self.entries]
-        )
+        self._inner = np.array([(*pose.position, *pose.orientation) for _, pose, *_ in self.entries])
 
     def move(self, poses: np.ndarray, moved: np.ndarray) -> None:
         if not self._changed and not moved[self._rows].any():

@@ -96,9 +96,7 @@ class ShapeMaker:
         )  # fmt: skip
         self._singles.add(where, _numbers(pose), plane)
 
-    def _add_mesh(
-        self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool
-    ) -> None:
+    def _add_mesh(self, where: Where, shape: Shape, what: str, rgba: Color, collision: bool) -> None:
         try:
             look = read_look(shape.mesh)
         except DescriptionError as error:

@@ -51,9 +51,7 @@ class RecordingOptions:
     def check(self) -> None:
         """Raises RecordingError if one of the options is invalid."""
         if self.path.suffix.lower() not in SUFFIXES:
-            raise RecordingError(
-                f"a recording's name ends in {' or '.join(SUFFIXES)}: not '{self.path}'"
-            )
+            raise RecordingError(f"a recording's name ends in {' or '.join(SUFFIXES)}: not '{self.path}'")
         if self.path.suffix.lower() == ".mp4" and not importlib.util.find_spec("imageio_ffmpeg"):
             command = installing("imageio-ffmpeg")
             raise RecordingError(f"an MP4 needs imageio-ffmpeg, an extra: '{command}' installs it")
@@ -62,9 +60,7 @@ class RecordingOptions:
         if not 0.0 < self.rate <= FASTEST:
             raise RecordingError(f"a recording has up to {FASTEST:g} frames a second")
         if not all(LEAST_SIZE <= side <= LARGEST_SIZE for side in (self.width, self.height)):
-            raise RecordingError(
-                f"a recording is {LEAST_SIZE} to {LARGEST_SIZE} pixels wide and high"
-            )
+            raise RecordingError(f"a recording is {LEAST_SIZE} to {LARGEST_SIZE} pixels wide and high")
 
 
 class RecordedModel(NamedTuple):
@@ -94,9 +90,7 @@ class SimulationRecorder:
             [sys.executable, "-P", "-c", MAIN], stdin=subprocess.PIPE, start_new_session=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
-        self._thread = threading.Thread(
-            target=self._feed, args=(options,), name="recording", daemon=True
-        )
+        self._thread = threading.Thread(target=self._feed, args=(options,), name="recording", daemon=True)
         self._thread.start()
         sim.listeners.append(self._on_tick)
 

@@ -35,9 +35,7 @@ logger = logging.getLogger(f"rosout.{__name__}")
 class DrawnPart:
     """Some triangles of one shape of a link."""
 
-    def __init__(
-        self, client: int, link: str, shape: Shape, piece: Piece, texture: int | None
-    ) -> None:
+    def __init__(self, client: int, link: str, shape: Shape, piece: Piece, texture: int | None) -> None:
         """`texture` is PyBullet's number of the piece's texture."""
         self.link, self.alpha = link, piece.rgba[3]
         self._client, self._pose = client, shape.pose
@@ -50,9 +48,7 @@ class DrawnPart:
         )  # fmt: skip
         self.body: int = pybullet.createMultiBody(0.0, -1, visual, physicsClientId=client)
         if texture is not None:
-            pybullet.changeVisualShape(
-                self.body, -1, textureUniqueId=texture, physicsClientId=client
-            )
+            pybullet.changeVisualShape(self.body, -1, textureUniqueId=texture, physicsClientId=client)
         self.place(Pose())
 
     def place(self, link: Pose) -> None:
@@ -178,9 +174,7 @@ class Renderer:
         whole[top:bottom, left:right] = np.asarray(Image.fromarray(drawn).reduce(FINER))
         return whole
 
-    def _layer(
-        self, camera: Camera, width: int, height: int, region: Region, bodies: bool = False
-    ) -> Layer:
+    def _layer(self, camera: Camera, width: int, height: int, region: Region, bodies: bool = False) -> Layer:
         """Draws a region; numbers of `bodies` only on request, because they take time."""
         left, top, right, bottom = region
         size = (FINER * (right - left), FINER * (bottom - top))
@@ -229,9 +223,7 @@ class Renderer:
             pybullet.disconnect(self._client)
 
 
-def _through(
-    colours: np.ndarray, limit: np.ndarray, layer: Layer, clear: Sequence[DrawnPart]
-) -> np.ndarray:
+def _through(colours: np.ndarray, limit: np.ndarray, layer: Layer, clear: Sequence[DrawnPart]) -> np.ndarray:
     """Draws the nearest of the `clear` parts over colours (h, w, 3) and depths (h, w) of everything else."""
     alphas = np.ones(layer.bodies.max() + 2)  # the last one stands for no body
     for part in clear:

@@ -103,9 +103,7 @@ def _link(description: ModelDescription, name: str, collisions: bool) -> Link:
 def visible_shapes(model: ModelDescription) -> list[tuple[str, Shape]]:
     """Returns a model's visible shapes with their links, or its collision shapes if it has no visuals."""
     visuals = [(link.name, shape) for link in model.links.values() for shape in link.visuals]
-    found = visuals or [
-        (link.name, shape) for link in model.links.values() for shape in link.collisions
-    ]
+    found = visuals or [(link.name, shape) for link in model.links.values() for shape in link.collisions]
     seen = [(link, shape) for link, shape in found if shape.rgba is None or shape.rgba[3] > 0.0]
     # The renderer draws the ground.
     return [(link, shape) for link, shape in seen if shape.kind != "plane"]
@@ -175,10 +173,7 @@ def boxes_of(shapes: Iterable[tuple[str, Shape]]) -> Iterator[tuple[str, Pose, n
 
 def moved(points: np.ndarray, pose: Pose) -> np.ndarray:
     """Transforms points (n, 3) from a frame into the one that its `pose` is given in."""
-    axes = [
-        rotate(pose.orientation, axis)
-        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    ]
+    axes = [rotate(pose.orientation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return np.asarray(points @ np.array(axes) + pose.position)
 
 

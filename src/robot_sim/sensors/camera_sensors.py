@@ -68,9 +68,7 @@ class DepthSensor(CameraSensor):
 
     kinds = DEPTH_KINDS
     fields: ClassVar = {
-        "depth": Field(
-            "(height, width) of float32 along the optical axis [m]; NaN beyond the cutoffs", True
-        )
+        "depth": Field("(height, width) of float32 along the optical axis [m]; NaN beyond the cutoffs", True)
     }
 
     def __init__(self, mount: Mount) -> None:

@@ -27,9 +27,7 @@ class ContactSensor(Measurement):
         found = [collision_named(name, link, list(model.collisions(link))) for name in names]
         for name, taken in zip(names, found, strict=True):
             if taken is None:
-                logger.warning(
-                    "Sensor '%s': link '%s' has no collision '%s'", sensor.name, link, name
-                )
+                logger.warning("Sensor '%s': link '%s' has no collision '%s'", sensor.name, link, name)
             elif taken != name:
                 logger.info("Sensor '%s': collision '%s' is '%s' here", sensor.name, name, taken)
         self._collisions = {(model.name, link, each) for each in found if each is not None}

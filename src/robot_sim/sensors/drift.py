@@ -32,9 +32,7 @@ class DriftingError(Stateful):
         self.scale = read(named("ScaleError"), 1.0)
         self.bias = np.zeros(AXES)  # the drift at present
 
-    def applied(
-        self, values: np.ndarray, seconds: float, random: np.random.Generator
-    ) -> np.ndarray:
+    def applied(self, values: np.ndarray, seconds: float, random: np.random.Generator) -> np.ndarray:
         """Returns `values` (3,) with the error after another time [s]."""
         walk = random.normal(0.0, 1.0, AXES) * np.sqrt(2.0 * self.frequency) * self.drift
         self.bias = np.exp(-seconds * self.frequency) * self.bias + seconds * walk

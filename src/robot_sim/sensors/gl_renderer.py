@@ -135,9 +135,7 @@ class GlRenderer(CameraRenderer):
             self._model, data, self._option, None, mj.MjvCamera(), mj.mjtCatBit.mjCAT_ALL, scene
         )
         near = max(camera.near, LEAST_NEAR)
-        across, up = (
-            0.5 * near * side / camera.focal_length for side in (camera.width, camera.height)
-        )
+        across, up = (0.5 * near * side / camera.focal_length for side in (camera.width, camera.height))
         for eye in scene.camera:
             _set(
                 eye, pos=places[0], forward=turns[0, :, 0], up=turns[0, :, 2], orthographic=0,

@@ -71,9 +71,7 @@ class Imu(Stateful):
         """Begins at rest, unless it has begun, so that the next measurement can be compared."""
         self._last = self._last or (0, -1, (0.0, 0.0, 0.0))
 
-    def measure(
-        self, now: int, moves: int, motion: LinkMotion, gravity: Vector
-    ) -> InertialSample | None:
+    def measure(self, now: int, moves: int, motion: LinkMotion, gravity: Vector) -> InertialSample | None:
         """Returns a measurement; None for the first one, which has none to compare with.
 
         Args:
@@ -171,17 +169,13 @@ class ImuSensor(ModelImu):
             (part, axis, noise)
             for part in ("angular_velocity", "linear_acceleration")
             for axis, letter in enumerate("xyz")
-            if (
-                noise := read_noise(sensor.element.find(f"imu/{part}/{letter}"), f"<imu>, <{part}>")
-            )
+            if (noise := read_noise(sensor.element.find(f"imu/{part}/{letter}"), f"<imu>, <{part}>"))
         ]
         return mount.model, sensor.link, sensor.pose
 
     def _rate(self, mount: Mount) -> float:
         assert mount.sensor is not None
-        return slower(
-            mount.rate("updateRateHZ", 1.0 if mount.plugin.filename else 0.0), mount.sensor.rate
-        )
+        return slower(mount.rate("updateRateHZ", 1.0 if mount.plugin.filename else 0.0), mount.sensor.rate)
 
     def _distorted(self, sample: InertialSample, random: np.random.Generator) -> InertialSample:
         biases = self.mount.biases() if self._noise else random
@@ -192,17 +186,12 @@ class ImuSensor(ModelImu):
         return sample
 
 
-def with_noise(
-    sample: InertialSample, deviation: float, random: np.random.Generator
-) -> InertialSample:
+def with_noise(sample: InertialSample, deviation: float, random: np.random.Generator) -> InertialSample:
     """Adds Gaussian noise of one deviation to all ten numbers; the quaternion keeps its length of 1."""
     if not deviation:
         return sample
     noisy = [
-        [
-            value + draw
-            for value, draw in zip(part, random.normal(0.0, deviation, len(part)), strict=True)
-        ]
+        [value + draw for value, draw in zip(part, random.normal(0.0, deviation, len(part)), strict=True)]
         for part in sample
     ]
     length = float(np.linalg.norm(noisy[0]))

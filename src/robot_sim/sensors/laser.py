@@ -69,9 +69,7 @@ class Laser:
         rays = self.horizontal.samples * self.vertical.samples
         readings = self.horizontal.readings * self.vertical.readings
         if max(rays, readings) > MOST_RAYS:
-            raise DescriptionError(
-                f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)"
-            )
+            raise DescriptionError(f"{where} has {rays} rays; up to {MOST_RAYS} are cast (MOST_RAYS)")
         self.low = value(ray, "range/min", where, 0.0)
         self.high = value(ray, "range/max", where, 0.0)
         if not 0.0 <= self.low < self.high <= FURTHEST:
@@ -91,9 +89,7 @@ class Laser:
         fans = self.horizontal, self.vertical
         return _directions(*(fan.angles(fan.readings) for fan in fans))
 
-    def measure(
-        self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator | None
-    ) -> Scan:
+    def measure(self, scene: RayScene, pose: Pose, bias: float, random: np.random.Generator | None) -> Scan:
         """Measures from `pose` in the world, with the noise's bias [m].
 
         The scene has collisions or visuals, see `sees_visuals`. Ranges are within the limits; inf for nothing
@@ -117,9 +113,7 @@ class Laser:
         return Scan(ranges, intensities)
 
 
-RANGES = Field(
-    "(n,) of float32 [m], the lowest row first; inf for nothing, -inf for too near", True
-)
+RANGES = Field("(n,) of float32 [m], the lowest row first; inf for nothing, -inf for too near", True)
 
 
 class LaserSensor(Measurement):
@@ -186,9 +180,7 @@ def nearest(scan: Scan, laser: Laser, deviation: float, random: np.random.Genera
 
 def _directions(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
     yaw, pitch = np.meshgrid(yaws, pitches)
-    return np.stack(
-        [np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], axis=-1
-    )
+    return np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], axis=-1)
 
 
 def _fan(ray: Element, name: str, where: str, samples: int) -> Fan:

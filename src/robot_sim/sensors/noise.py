@@ -48,9 +48,7 @@ class Noise:
 
     def draw_bias(self, random: np.random.Generator) -> float:
         """Returns a sensor's bias: of either sign, as in Gazebo."""
-        size = (
-            random.normal(self.bias_mean, self.bias_stddev) if self.bias_stddev else self.bias_mean
-        )
+        size = random.normal(self.bias_mean, self.bias_stddev) if self.bias_stddev else self.bias_mean
         return float(size if random.random() < 0.5 else -size)
 
     def applied(self, values: np.ndarray, bias: float, random: np.random.Generator) -> np.ndarray:
@@ -79,16 +77,12 @@ def read_noise(parent: Element | None, where: str) -> Noise | None:
         what = f"{where}, <noise>: <{name}>"
         checked_deviation(number if name in DEVIATIONS else abs(number), what)
         if name == "precision" and 0.0 < abs(number) < 1.0 / LARGEST_DEVIATION:
-            raise DescriptionError(
-                f"{what} is {number:g}; it must be {1.0 / LARGEST_DEVIATION:g} or more"
-            )
+            raise DescriptionError(f"{what} is {number:g}; it must be {1.0 / LARGEST_DEVIATION:g} or more")
     return Noise(**{name: number + 0.0 for name, number in found.items()})
 
 
 def checked_deviation(deviation: float, what: str) -> float:
     """Returns a deviation; a negative or absurd one is a DescriptionError."""
     if not 0.0 <= deviation <= LARGEST_DEVIATION:
-        raise DescriptionError(
-            f"{what} is {deviation:g}; it must be between 0 and {LARGEST_DEVIATION:g}"
-        )
+        raise DescriptionError(f"{what} is {deviation:g}; it must be between 0 and {LARGEST_DEVIATION:g}")
     return deviation + 0.0  # of -0.0 NumPy's generator says that it is negative

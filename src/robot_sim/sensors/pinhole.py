@@ -38,9 +38,7 @@ class PinholeCamera:
     file says.
     """
 
-    def __init__(
-        self, element: Element, pose: Pose, where: str, link: str, scale: float = 1.0
-    ) -> None:
+    def __init__(self, element: Element, pose: Pose, where: str, link: str, scale: float = 1.0) -> None:
         self.link = link
         self.pose = pose.compose(read_pose(element, f"{where}, <camera>")[0])
         self.width, self.height = (
@@ -62,8 +60,7 @@ class PinholeCamera:
         self.noise: Noise | None = read_noise(element, where)
         self.focal_length = self.width / (2.0 * math.tan(self.field_of_view / 2.0))  # [pixels]
         self.across, down = (
-            (np.arange(count) + 0.5 - count / 2.0) / self.focal_length
-            for count in (self.width, self.height)
+            (np.arange(count) + 0.5 - count / 2.0) / self.focal_length for count in (self.width, self.height)
         )
         self.down = down[:, None]
 
@@ -78,9 +75,7 @@ class PinholeCamera:
             self._see(CameraView(*(each[piece] for each in seen)), piece, scene, pose, in_colour)
         return seen
 
-    def _see(
-        self, seen: CameraView, rows: slice, scene: RayCaster, pose: Pose, in_colour: bool
-    ) -> None:
+    def _see(self, seen: CameraView, rows: slice, scene: RayCaster, pose: Pose, in_colour: bool) -> None:
         """Fills in some rows of a view."""
         turns, places = frames([pose])
         axes = np.broadcast_arrays(1.0, -self.across, -self.down[rows])
@@ -123,9 +118,7 @@ class Shot(NamedTuple):
         )
 
 
-def noisy(
-    picture: np.ndarray, noise: Noise, bias: float, random: np.random.Generator
-) -> np.ndarray:
+def noisy(picture: np.ndarray, noise: Noise, bias: float, random: np.random.Generator) -> np.ndarray:
     """Returns a picture of uint8 with noise, whose unit is the whole range of a channel."""
     values = noise.applied(picture / 255.0, bias, random)
     return np.rint(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)

@@ -64,9 +64,7 @@ class RayCaster:
         )
 
     @np.errstate(over="ignore", invalid="ignore")  # of what is light years away
-    def cast(
-        self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
-    ) -> Hits:
+    def cast(self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf) -> Hits:
         """Returns what rays meet first.
 
         A ray that starts inside a shape meets it where it leaves.
@@ -87,9 +85,7 @@ class RayCaster:
             some = np.flatnonzero(self._kinds[targets] == kind)
             if not len(some):
                 continue
-            distances = self._distances(
-                kind, targets[some], starts[rays[some]], directions[rays[some]]
-            )
+            distances = self._distances(kind, targets[some], starts[rays[some]], directions[rays[some]])
             found.improve(rays[some], targets[some], distances)
         for target, triangles in self._apart_meshes.items():
             self._meet_mesh(found, target, triangles, rays[targets == target], starts, directions)
@@ -132,9 +128,7 @@ class RayCaster:
         found.triangles[rays[some]] = met.triangles[some]
         found.weights[rays[some]] = met.weights[some]
 
-    def _pairs(
-        self, origin: np.ndarray, directions: np.ndarray, far: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs(self, origin: np.ndarray, directions: np.ndarray, far: float) -> tuple[np.ndarray, np.ndarray]:
         """Returns which targets' bounding balls are met by which rays: two arrays of indices."""
         apart = self._apart
         ways = self._apart_centres - origin
@@ -156,9 +150,7 @@ class RayCaster:
         which, rays = meets.nonzero()
         return apart[which], rays
 
-    def _pass_above(
-        self, meets: np.ndarray, target: int, origin: np.ndarray, directions: np.ndarray
-    ) -> None:
+    def _pass_above(self, meets: np.ndarray, target: int, origin: np.ndarray, directions: np.ndarray) -> None:
         """Excludes rays from within a target's ball that pass above it, as those of a laser on a robot do."""
         axis = self._turns[target][:, 2]
         height = float((origin - self._places[target]) @ axis)
@@ -173,13 +165,9 @@ class RayCaster:
         """Returns the distances of pairs of a target and a ray: inputs and result (k, ...)."""
         turns = self._turns[targets]
         origins = np.einsum("kji,kj->ki", turns, starts - self._places[targets])
-        return DISTANCES[kind](
-            origins, np.einsum("kji,kj->ki", turns, directions), self._sizes[targets]
-        )
+        return DISTANCES[kind](origins, np.einsum("kji,kj->ki", turns, directions), self._sizes[targets])
 
-    def _plane_distances(
-        self, target: int, starts: np.ndarray, directions: np.ndarray
-    ) -> np.ndarray:
+    def _plane_distances(self, target: int, starts: np.ndarray, directions: np.ndarray) -> np.ndarray:
         normal = self._turns[target][:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             distances = ((self._places[target] - starts) @ normal) / (directions @ normal)
@@ -235,9 +223,7 @@ class RayScene(RayCaster):
         """Says that things may have moved: the next cast looks where they are."""
         self.scene.expire()
 
-    def cast(
-        self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf
-    ) -> Hits:
+    def cast(self, origin: np.ndarray, directions: np.ndarray, near: Any = 0.0, far: Any = math.inf) -> Hits:
         self.show(self.scene.state())
         return super().cast(origin, directions, near, far)
 

@@ -94,8 +94,7 @@ class WorldScene:
             self._parts = {model: known.get(model) or self._parts_of(model) for model in models}
             self._key, self._version = key, self._version + 1
             self._targets = {
-                model.number: [target for _, target in parts]
-                for model, parts in self._parts.items()
+                model.number: [target for _, target in parts] for model, parts in self._parts.items()
             }
             targets = [target for found in self._targets.values() for target in found]
             self._own_turns, self._own_places = frames([target.shape.pose for target in targets])
@@ -105,14 +104,10 @@ class WorldScene:
         elif len(self._moving):
             self._turns, self._places = self._turns.copy(), self._places.copy()
             moving = [model for model in models if not model.description.static]
-            self._turns[self._moving], self._places[self._moving] = self._placed(
-                moving, self._moving
-            )
+            self._turns[self._moving], self._places[self._moving] = self._placed(moving, self._moving)
         lights = self._world.lights.values()
         beams = [beam_of(each) for each in lights if each.kind == "directional"]
-        return SceneState(
-            self._version, self._targets, self._turns, self._places, beams or [beam_of(SUN)]
-        )
+        return SceneState(self._version, self._targets, self._turns, self._places, beams or [beam_of(SUN)])
 
     def _parts_of(self, model: Model) -> list[tuple[str, Target]]:
         links = model.description.links.values()
@@ -154,6 +149,4 @@ def _seen(model: Model, link: Link) -> Iterator[Target]:
             for piece in pieces_of(shape):
                 yield Target(shape, is_static, piece)
         except DescriptionError as error:
-            logger.warning(
-                "model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error
-            )
+            logger.warning("model '%s', link '%s' isn't seen whole: %s", model.name, link.name, error)

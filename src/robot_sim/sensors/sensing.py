@@ -196,9 +196,7 @@ def sensor_of(mount: Mount, kinds: Sequence[str]) -> Sensor:
     sensor = mount.sensor
     if sensor is None or sensor.kind not in kinds:
         found = "a model" if sensor is None else f"the {sensor.kind} sensor '{sensor.name}'"
-        raise DescriptionError(
-            f"it belongs to {found}, not to a sensor of type {' or '.join(kinds)}"
-        )
+        raise DescriptionError(f"it belongs to {found}, not to a sensor of type {' or '.join(kinds)}")
     return sensor
 
 

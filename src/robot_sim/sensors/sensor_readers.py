@@ -143,9 +143,7 @@ def _sized(sensor: Sensor | None, size: str) -> Sensor:
     element = copy.deepcopy(sensor.element) if sensor else WITHOUT.element
     camera = element.find("camera")
     if sensor is None or camera is None:
-        raise UnknownName(
-            f"only a camera has a size, as @{size}: '{sensor and sensor.name}' is none"
-        )
+        raise UnknownName(f"only a camera has a size, as @{size}: '{sensor and sensor.name}' is none")
     image = camera.find("image")
     image = SubElement(camera, "image") if image is None else image
     for tag, side in zip(("width", "height"), sides, strict=True):
@@ -208,9 +206,7 @@ class MeasuringHandle(SensorHandle):
             self._told(now)
 
 
-def offer_sensors(
-    hardware: RobotHardware, sim: Simulator, model: Model, sensing: Sensing | None
-) -> None:
+def offer_sensors(hardware: RobotHardware, sim: Simulator, model: Model, sensing: Sensing | None) -> None:
     """Gives controllers a model's IMUs and force-torque sensors.
 
     Without `sensing` they measure nothing.
@@ -227,7 +223,5 @@ def offer_sensors(
             hardware.sensors[measurement.interface].append(
                 partial(SensorHandle, sensor.name, frame)
                 if sensing is None
-                else partial(
-                    MeasuringHandle, Mount(sim, model, plugin, sensing, sensor), measurement, frame
-                )
+                else partial(MeasuringHandle, Mount(sim, model, plugin, sensing, sensor), measurement, frame)
             )

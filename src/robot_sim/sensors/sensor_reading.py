@@ -24,9 +24,7 @@ class Reading:
         try:
             return values[name]
         except KeyError:
-            raise AttributeError(
-                f"the sensor measures no {name}; it has {', '.join(values)}"
-            ) from None
+            raise AttributeError(f"the sensor measures no {name}; it has {', '.join(values)}") from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Reading) and repr(self) == repr(other)

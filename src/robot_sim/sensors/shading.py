@@ -42,9 +42,7 @@ def _light(beams: Iterable[Beam], normals: np.ndarray) -> np.ndarray:
     return found
 
 
-def _own_colours(
-    scene: RayCaster, target: int, triangles: np.ndarray, weights: np.ndarray
-) -> np.ndarray:
+def _own_colours(scene: RayCaster, target: int, triangles: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Returns the unlit colours (k, 3) of points of a target."""
     piece = scene.targets[target].piece
     tint = 255.0 * np.array(scene.targets[target].rgba[:3])

@@ -91,9 +91,7 @@ def shut_down_nodes(nodes: dict[str, str], timeout: float = 5.0) -> list[str]:
     Returns the names that are still registered after `timeout` [s].
     """
     asked = {
-        name: address
-        for name, address in nodes.items()
-        if name not in CORE_NODES and not is_own(address)
+        name: address for name, address in nodes.items() if name not in CORE_NODES and not is_own(address)
     }
     for address in asked.values():
         ask_to_shut_down(address)

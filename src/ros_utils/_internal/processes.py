@@ -150,9 +150,7 @@ def end_orphans(reap: Callable[[set[str]], bool]) -> bool:
     return end(orphans, reap)
 
 
-def _end_wave(
-    starts: Sequence[Start], patience: float, reap: Callable[[set[str]], bool]
-) -> set[str]:
+def _end_wave(starts: Sequence[Start], patience: float, reap: Callable[[set[str]], bool]) -> set[str]:
     """Sends SIGINT, then SIGTERM, then SIGKILL; returns the tokens of starts that still run."""
     for number, grace in (
         (signal.SIGINT, patience),

@@ -177,13 +177,9 @@ def start(
         keep_code = '"$@"; echo $? > "$0"'
         full = ["xterm", "-T", label, "-e", "/bin/sh", "-c", keep_code, status_file, *full]
     elif window and not log_file:
-        _log.info(
-            f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}"
-        )
+        _log.info(f"{label}: no display or no xterm, so its output goes to {log or 'this terminal'}")
     this = _processes.Start(token, kind, label, _master.uri(), os.getpid() if bound else 0)
-    handle = Handle(
-        this, _spawn(full, {**_environment(this), **(env or {})}, log), log, status_file
-    )
+    handle = Handle(this, _spawn(full, {**_environment(this), **(env or {})}, log), log, status_file)
     with _lock:
         _handles.append(handle)
     return handle
@@ -271,9 +267,7 @@ def _spawn(
                 start_new_session=True,
             )  # fmt: skip
         except (OSError, ValueError) as fault:
-            raise CannotStart(
-                f"{command[0]}: {getattr(fault, 'strerror', None) or fault}"
-            ) from fault
+            raise CannotStart(f"{command[0]}: {getattr(fault, 'strerror', None) or fault}") from fault
 
 
 @atexit.register
@@ -326,9 +320,7 @@ def await_start(
     return wait_for_world(Started(handle), ready, begin + timeout, timeout)
 
 
-def wait_for_world(
-    started: Started, ready: Ready | None, deadline: float, timeout: float
-) -> Started | bool:
+def wait_for_world(started: Started, ready: Ready | None, deadline: float, timeout: float) -> Started | bool:
     """Waits until a world is ready; ends the program if it isn't by the deadline (time.monotonic()).
 
     `timeout` is the wait that the error reports [s].

@@ -29,9 +29,7 @@ def start(
     _programs.end_orphans()  # else their ending master would pass for a lasting one
     _master.is_up_or_startable()
     command = ["roslaunch", *arguments]
-    return _programs.start(
-        command, "launch", label, window=window, screen=screen, log_file=log_file, env=env
-    )
+    return _programs.start(command, "launch", label, window=window, screen=screen, log_file=log_file, env=env)
 
 
 def start_master(window: bool, timeout: float) -> Started | bool:

@@ -78,9 +78,7 @@ class Bench:
             os.environ["ROS_MASTER_URI"] = f"http://{LOOPBACK}:{reserved_port()}"
             os.environ["ROS_IP"] = LOOPBACK
             if not roslaunch.start_master(window=False, timeout=STARTING):
-                raise WorldError(
-                    f"no ROS master could be started at {master.uri()}; the log says why"
-                )
+                raise WorldError(f"no ROS master could be started at {master.uri()}; the log says why")
 
     @contextlib.contextmanager
     def world(self, seed: int, recorded: Path | None = None) -> Iterator[RobotWorld]:

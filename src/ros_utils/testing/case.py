@@ -63,8 +63,6 @@ class RobotTestCase(unittest.TestCase):
             texts = [text.strip() for _, text in (*result.errors, *result.failures)]
             is_same = any(text.endswith(message) for text in texts)
             other = message if is_same else "".join(texts[:1]).rpartition("\n")[2]
-            return tell(
-                folder, self.seed, "".join(traceback.format_exception(fault)), message, other
-            )
+            return tell(folder, self.seed, "".join(traceback.format_exception(fault)), message, other)
         except OSError as refused:
             return f"not recorded: {refused}"

@@ -56,9 +56,7 @@ class LockstepSubscriber:
 
         Raises WorldError if the world is paused, so that no time would ever pass.
         """
-        request = AdvanceWorldRequest(
-            node=self._name, ticks=min(ticks, LONGEST), until=[self._topic]
-        )
+        request = AdvanceWorldRequest(node=self._name, ticks=min(ticks, LONGEST), until=[self._topic])
         answer = self._call(request)
         if ticks and answer.paused:
             raise WorldError("the world is paused: no time passes")

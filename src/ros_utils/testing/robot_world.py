@@ -81,9 +81,7 @@ class RobotWorld(SteppedWorld):
             self._check_start(ns, joints or {})
             done = bool(ros_gazebo.gazebo_spawn_urdf_param(DESCRIPTION, *place))
         if not done or (run and not ros_controllers.spawn_controllers_srv(run, ns)):
-            raise WorldError(
-                f"{file} can't be spawned, or not with its controllers; the log says why"
-            )
+            raise WorldError(f"{file} can't be spawned, or not with its controllers; the log says why")
         if joints:
             positions = list(joints.values())
             self._client.send(StepWorldRequest(joints=list(joints), positions=positions))
@@ -178,9 +176,7 @@ class RobotWorld(SteppedWorld):
 
         self.assert_that(look, f"{distance:g} ± {within:g} m", by, stays)
 
-    def assert_that(
-        self, look: Callable[[], str], wanted: str, by: float = 0.0, stays: float = 0.0
-    ) -> None:
+    def assert_that(self, look: Callable[[], str], wanted: str, by: float = 0.0, stays: float = 0.0) -> None:
         """Asserts a condition of your own, looked at after each physics step.
 
         Args:
@@ -236,9 +232,7 @@ def _check_described(controller: str, ns: str) -> None:
     described = [name for name, each in known.items() if isinstance(each, dict) and "type" in each]
     if controller.partition("/")[0] not in known:
         near = nearest_or_all(controller, described)
-        raise WorldError(
-            f"there is no controller '{controller}' among the parameters of '{ns}'{near}"
-        )
+        raise WorldError(f"there is no controller '{controller}' among the parameters of '{ns}'{near}")
 
 
 def _point(position: Sequence[float | None]) -> str:

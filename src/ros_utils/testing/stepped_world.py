@@ -80,9 +80,7 @@ class SteppedWorld:
         if every is not None:
             ticks = self._ticks(every)
             if not ticks:
-                raise WorldError(
-                    "a command can't be sent every 0 s: a physics step or more is needed"
-                )
+                raise WorldError("a command can't be sent every 0 s: a physics step or more is needed")
             self._repeated[controller] = self._passed, ticks, values
         self._commands[controller] = values
 

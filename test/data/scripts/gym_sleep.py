@@ -19,9 +19,7 @@ class CartPoleEnv(gymnasium.Env):
     def __init__(self):
         self.action_space = gymnasium.spaces.Discrete(2)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float32)
-        self.command = rospy.Publisher(
-            "/stand_cart_position_controller/command", Float64, queue_size=1
-        )
+        self.command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
         rospy.Subscriber("/joint_states", JointState, self.on_state, queue_size=1)
         self.unpause = rospy.ServiceProxy("/gazebo/unpause_physics", Empty)
         self.pause = rospy.ServiceProxy("/gazebo/pause_physics", Empty)

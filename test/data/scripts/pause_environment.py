@@ -14,9 +14,7 @@ class CartPole:
         self.unpause = rospy.ServiceProxy("/gazebo/unpause_physics", Empty)
         self.pause = rospy.ServiceProxy("/gazebo/pause_physics", Empty)
         self.reset_simulation = rospy.ServiceProxy("/gazebo/reset_simulation", Empty)
-        self.command = rospy.Publisher(
-            "/stand_cart_position_controller/command", Float64, queue_size=1
-        )
+        self.command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
 
     def state(self):
         data = None

@@ -10,9 +10,7 @@ rospy.init_node("poll_link_state")
 rospy.wait_for_service("/gazebo/reset_simulation")
 rospy.ServiceProxy("/gazebo/reset_simulation", Empty)()
 link_state = rospy.ServiceProxy("/gazebo/get_link_state", GetLinkState)
-command = rospy.Publisher(
-    "/stand_cart_position_controller/command", Float64, queue_size=1, latch=True
-)
+command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1, latch=True)
 rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
 for goal in (0.2, 0.1, 0.3):
     command.publish(goal)

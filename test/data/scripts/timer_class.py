@@ -15,9 +15,7 @@ class Controller:
         self.state = None
         self.seen = []
         self.done = threading.Event()
-        self.command = rospy.Publisher(
-            "/stand_cart_position_controller/command", Float64, queue_size=10
-        )
+        self.command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=10)
         rospy.Subscriber("/joint_states", JointState, self.on_state, queue_size=1)
         self.timer = rospy.Timer(rospy.Duration(0.02), self.on_timer)
 

@@ -22,9 +22,7 @@ for positions in ([0.1, 0.05], [-0.1, 0.0], [0.0, 0.1]):
     goal = FollowJointTrajectoryGoal()
     goal.trajectory.joint_names = ["effort_a", "effort_b"]
     goal.trajectory.points = [
-        JointTrajectoryPoint(
-            positions=positions, velocities=[0.0, 0.0], time_from_start=rospy.Duration(1.0)
-        )
+        JointTrajectoryPoint(positions=positions, velocities=[0.0, 0.0], time_from_start=rospy.Duration(1.0))
     ]
     client.send_goal(goal, feedback_cb=lambda feedback: print("at", feedback.actual.positions))
     print(client.wait_for_result(rospy.Duration(10.0)), client.get_state(), rospy.get_time())

@@ -23,9 +23,7 @@ class PgTrainFaults(PlaceCase):
         return summary
 
     def assert_failed(self, training: Process) -> dict:
-        complaints = [
-            line for line in self.ends(training, 1).splitlines() if "pg_train.py:" in line
-        ]
+        complaints = [line for line in self.ends(training, 1).splitlines() if "pg_train.py:" in line]
         self.assertEqual(len(complaints), 1, training.output)
         self.assertIn("progress is saved", complaints[0])
         summary = self.assert_saved()

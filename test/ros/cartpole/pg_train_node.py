@@ -49,9 +49,7 @@ class PgTrain(PlaceCase):
 
     def assert_same_weights(self, one, other):
         for name in NETWORKS:
-            ours, theirs = (
-                torch.load(place.run / name, weights_only=True) for place in (one, other)
-            )
+            ours, theirs = (torch.load(place.run / name, weights_only=True) for place in (one, other))
             self.assertEqual(ours.keys(), theirs.keys())
             self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
 

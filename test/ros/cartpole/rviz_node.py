@@ -54,9 +54,7 @@ class Rviz(PlaceCase):
         request = CONFIGURE % (position, angle)
         deadline, pause = time.monotonic() + BOUND, threading.Event()
         while True:
-            call = self.place.start(
-                "rosservice", "call", "/gazebo/set_model_configuration", request
-            )
+            call = self.place.start("rosservice", "call", "/gazebo/set_model_configuration", request)
             call.end()
             if "success: True" in call.output:
                 return

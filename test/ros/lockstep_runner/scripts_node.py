@@ -27,9 +27,7 @@ HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None
 
 def lockstep(*arguments, **options):
     command = [sys.executable, str(ROOT / "scripts" / "lockstep.py"), *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=BOUND, check=False, **options
-    )
+    return subprocess.run(command, capture_output=True, text=True, timeout=BOUND, check=False, **options)
 
 
 def written(text):

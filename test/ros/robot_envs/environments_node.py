@@ -27,9 +27,7 @@ REALTIME = BACKEND == "ros-realtime"
 
 class Conformance(unittest.TestCase):
     def test_they_keep_what_environments_of_robots_promise(self):
-        kinds = (
-            {IDS[0]: RICH} if REALTIME else {IDS[0]: RICH, IDS[2]: {}}
-        )  # of each kind of actions
+        kinds = {IDS[0]: RICH} if REALTIME else {IDS[0]: RICH, IDS[2]: {}}  # of each kind of actions
         for identifier, options in kinds.items():
             with self.subTest(identifier, options=options):
                 check_robot_env(identifier, (BACKEND,), options=options, steps=30)
@@ -57,9 +55,7 @@ class Lockstep(unittest.TestCase):
             self.skipTest("time runs by itself")
 
     def test_the_bits_are_those_of_the_environment_in_process(self):
-        for identifier, options in zip(
-            IDS, ({}, {}, RICH | {"control_period": 0.005}), strict=True
-        ):
+        for identifier, options in zip(IDS, ({}, {}, RICH | {"control_period": 0.005}), strict=True):
             with self.subTest(identifier):
                 runs = []
                 for backend in ("ros", "bullet"):

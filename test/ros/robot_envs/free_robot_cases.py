@@ -35,9 +35,7 @@ class FreeRobot(unittest.TestCase):
         session.start(lambda _: None)
         pictures, places = {}, {}
         for backend in ("ros", "bullet"):
-            env = RobotEnv(
-                robot, Upright(), backend, render_mode="rgb_array", width=160, height=120
-            )
+            env = RobotEnv(robot, Upright(), backend, render_mode="rgb_array", width=160, height=120)
             pictures[backend] = []
             env.reset(seed=3)
             for _ in range(4):

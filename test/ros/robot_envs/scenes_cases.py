@@ -30,9 +30,7 @@ class Scenes:
     def test_the_bits_are_those_of_the_world_in_process(self):
         over_ros, here = self.make(), self.make("bullet")
         for seed in (7, 8):  # the second time after other episodes
-            self.assertEqual(
-                differences(rollout(over_ros, 130, seed), rollout(here, 130, seed)), ""
-            )
+            self.assertEqual(differences(rollout(over_ros, 130, seed), rollout(here, 130, seed)), "")
 
 
 class Arms(Scenes, unittest.TestCase):
@@ -43,9 +41,7 @@ class Arms(Scenes, unittest.TestCase):
         return Volley(Path(folder))
 
     def test_it_keeps_what_environments_of_robots_promise(self):
-        check_robot_env(
-            lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",), steps=30
-        )
+        check_robot_env(lambda **options: RobotEnv(self.robots, self.task(), **options), ("ros",), steps=30)
 
     def test_pictures_show_the_same_as_of_the_world_in_process(self):
         pictures = []

@@ -37,9 +37,7 @@ class SecondRobot(unittest.TestCase):
 
     def test_what_was_missing_was_started_and_told(self):
         controllers = "starting joint_state_controller, hinge_effort_controller"
-        self.assertEqual(
-            self.said, ["starting the simulator", "spawning the robot 'pendulum'", controllers]
-        )
+        self.assertEqual(self.said, ["starting the simulator", "spawning the robot 'pendulum'", controllers])
         pose = ros_gazebo.gazebo_get_model_state("pendulum")[1]
         self.assertAlmostEqual(pose.position.z, 0.3)
         self.assertEqual(ros_gazebo.gazebo_get_time_step(), 0.002)
@@ -81,9 +79,7 @@ class Lockstep(SecondRobot):
                 self.assertEqual(differences(*runs), "")
 
     def test_what_is_told_of_the_world_has_the_bits_of_the_robot_in_process(self):
-        query = StateQuery(
-            links=(LinkQuery("rod"), LinkQuery("pendulum::rod")), models=("pendulum",)
-        )
+        query = StateQuery(links=(LinkQuery("rod"), LinkQuery("pendulum::rod")), models=("pendulum",))
         turned = {"pendulum": Motion(Pose((0.1, -0.2, 0.4), (0.1, 0.0, 2.0, 0.3)))}
         runs = []
         for backend in (self.session.connect(self.scene, 0.01), InProcessWorld(self.scene, 0.01)):

@@ -65,9 +65,7 @@ class Seeing(unittest.TestCase):
     def test_unknown_sensors_are_told_with_those_there_are(self):
         task = Look()
         task.query = StateQuery(sensors=("lidar",))
-        with self.assertRaisesRegex(
-            SimulatorError, "no sensor 'lidar' .*there are: front_laser, sonar"
-        ):
+        with self.assertRaisesRegex(SimulatorError, "no sensor 'lidar' .*there are: front_laser, sonar"):
             self.make(task=task)
 
 

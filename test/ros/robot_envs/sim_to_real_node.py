@@ -115,9 +115,7 @@ class Realtime(Session):
     def test_surfaces_are_refused_with_the_reason(self):
         env = make_rig("ros-realtime")
         self.addCleanup(env.close)
-        with self.assertRaisesRegex(
-            SimulatorError, "set_link_friction: the simulator isn't in lock-step"
-        ):
+        with self.assertRaisesRegex(SimulatorError, "set_link_friction: the simulator isn't in lock-step"):
             env.backend.vary(Variation(surfaces={"cart": 0.5}))
 
 

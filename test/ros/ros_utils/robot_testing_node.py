@@ -59,9 +59,7 @@ class Robots(RobotTestCase):
         self.spawn()
         with self.assertRaisesRegex(WorldError, "every 0 s"):
             self.world.command(CART, 0.1, every=0.0)
-        self.world.follow(
-            "cartpole", "half_way.py", hears="/joint_states", commands=f"/{CART}/command"
-        )
+        self.world.follow("cartpole", "half_way.py", hears="/joint_states", commands=f"/{CART}/command")
         ros_gazebo.gazebo_pause_physics()
         with self.assertRaisesRegex(WorldError, "the world is paused"):
             self.world.wait(1.0)
@@ -153,9 +151,7 @@ class Robots(RobotTestCase):
     def episode(self):
         self.spawn(joints={"cart_pole": 0.05})
         self.world.spawn(SENSORS, name="bot", xyz=(0.0, 1.0, 0.0))
-        self.world.follow(
-            "cartpole", "half_way.py", hears="/joint_states", commands=f"/{CART}/command"
-        )
+        self.world.follow("cartpole", "half_way.py", hears="/joint_states", commands=f"/{CART}/command")
         self.world.assert_joint("stand_cart", 0.3, within=0.05, by=5.0)
         self.spawn_box("0.1 2 2", static=True, name="wall", xyz=(1.05, 1.0, 0.0))
         self.world.assert_nearest("scanner", 1.0, within=0.1, by=0.2)

@@ -67,9 +67,7 @@ class Package(unittest.TestCase):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         os.environ["ROS_PACKAGE_PATH"] = f"{folder.name}:{os.environ['ROS_PACKAGE_PATH']}"
-        cls.simulation = Simulation(
-            paused=True, custom_world_pkg="my_robot", custom_world_name="light.world"
-        )
+        cls.simulation = Simulation(paused=True, custom_world_pkg="my_robot", custom_world_name="light.world")
         cls.addClassCleanup(cls.simulation.close)
 
     def setUp(self):
@@ -115,9 +113,7 @@ class Package(unittest.TestCase):
         pose = {"pos_x": 2.0, "ori_z": 1.0, "ori_w": 0.0, "reference_frame": "x"}
         for name, spawned in {
             "a": ros_gazebo.gazebo_spawn_urdf_path(urdf, "a", "/a", **pose)[0],
-            "b": ros_gazebo.gazebo_spawn_urdf_pkg(
-                "my_robot", "robot.xacro", "/urdf", "b", "/b", **pose
-            )[0],
+            "b": ros_gazebo.gazebo_spawn_urdf_pkg("my_robot", "robot.xacro", "/urdf", "b", "/b", **pose)[0],
             "c": ros_gazebo.gazebo_spawn_urdf_string(xml, "c", "/c", verify=True, **pose)[0],
             "d": ros_gazebo.gazebo_spawn_urdf_param("text", "d", "/p", **pose)[0],
             "e": ros_gazebo.gazebo_spawn_sdf_path(sdf, "e", **pose),

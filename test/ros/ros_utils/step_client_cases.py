@@ -63,9 +63,7 @@ class OneRobot(Clients):
             runs.append([client.step(8, {CART: 0.02 * n}).joint_states.position for n in range(20)])
         self.assertEqual(runs[0], runs[1])
         self.assertEqual(client.reset(everything=True).sim_time, 0.0)
-        self.assertEqual(
-            client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"]
-        )
+        self.assertEqual(client.step(8, model_states=True).model_names, ["ground_plane", "cartpole"])
 
     def test_a_simulator_that_hangs_is_an_error_in_time(self):
         client = self.client(timeout=1.0)
@@ -98,9 +96,7 @@ class OwnSimulators(Clients):
                 client.step(8, {CART: 0.1})
             found = positions(client.step(200, {f"/left/{CART}": 0.1, f"/right/{CART}": -0.1}))
             self.assertEqual(len(found), 4)
-            self.assertAlmostEqual(
-                found["left::stand_cart"], -found["right::stand_cart"], places=12
-            )
+            self.assertAlmostEqual(found["left::stand_cart"], -found["right::stand_cart"], places=12)
             self.assertGreater(found["left::stand_cart"], 0.05)
 
     def test_a_restarted_simulator_is_found_again(self):

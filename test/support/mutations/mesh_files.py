@@ -11,8 +11,7 @@ FACES = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4),
 def binary_stl(size=1.0, corners=CORNERS):
     """A cube with edges of twice `size` [m], or what else has such corners."""
     facets = (
-        struct.pack("<12fH", 0, 0, 0, *(size * x for i in face for x in corners[i]), 0)
-        for face in FACES
+        struct.pack("<12fH", 0, 0, 0, *(size * x for i in face for x in corners[i]), 0) for face in FACES
     )
     return bytes(80) + struct.pack("<I", len(FACES)) + b"".join(facets)
 

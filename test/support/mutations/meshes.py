@@ -137,9 +137,7 @@ def _element(draw: Callable, data: bytes) -> bytes:
         return data
     elements = list(root.iter())
     element = draw(st.sampled_from(elements))
-    kind = draw(
-        st.sampled_from(["drop", "copy", "tag", "attribute", "attribute", "remove", "text"])
-    )
+    kind = draw(st.sampled_from(["drop", "copy", "tag", "attribute", "attribute", "remove", "text"]))
     space = root.tag.rpartition("}")[0] + "}" if "}" in root.tag else ""
     ids = [each.get("id", "") for each in elements if each.get("id")]
     if kind == "drop":
@@ -174,9 +172,7 @@ def _binary_stl(draw: Callable) -> bytes:
             struct.pack_into("<I", data, 80, count)
         elif kind == "number" and len(data) >= 134:
             place = 84 + 50 * draw(st.integers(0, (len(data) - 84) // 50 - 1))
-            bits = draw(
-                st.sampled_from([0, 1, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F7FFFFF, 0x80000000])
-            )
+            bits = draw(st.sampled_from([0, 1, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F7FFFFF, 0x80000000]))
             struct.pack_into("<I", data, place + 4 * draw(st.integers(0, 11)), bits)
         elif kind == "cut":
             del data[draw(st.integers(0, len(data))) :]

@@ -146,9 +146,7 @@ def _load(tree: dict[str, Any]) -> str:
         description = read_description(_slides()).limited_by(tree.get("joint_limits"))
         gains = tree.get("gazebo_ros_control")
         gains = gains.get(GAINS.rpartition("/")[2]) if isinstance(gains, dict) else None
-        manager = ControllerManager(
-            RobotHardware(description, gains if isinstance(gains, dict) else {})
-        )
+        manager = ControllerManager(RobotHardware(description, gains if isinstance(gains, dict) else {}))
     except ControlError as error:
         assert "\n" not in str(error)
         return str(error)

@@ -41,9 +41,7 @@ def _changed(base: str, changes: list[tuple[str, int, int, int]]) -> str:
     return tostring(root, encoding="unicode")
 
 
-def _change(
-    kind: str, one: Element, other: Element, parents: dict[Element, Element], pick: int
-) -> None:
+def _change(kind: str, one: Element, other: Element, parents: dict[Element, Element], pick: int) -> None:
     parent = parents.get(one)
     odd = ODD[pick % len(ODD)]
     if kind == "attribute":

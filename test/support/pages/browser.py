@@ -60,9 +60,7 @@ class Output:
     def line(self, text):
         """Returns the first line with `text` in it, once it is there."""
         found = wait_for(
-            lambda: (
-                [each for each in self.lines if text in each] or self.process.poll() is not None
-            ),
+            lambda: [each for each in self.lines if text in each] or self.process.poll() is not None,
             f"line {text!r}",
         )
         assert found is not True, self.lines
@@ -142,9 +140,7 @@ class Browser:
 
     def run(self, script):
         """Returns the value of a JavaScript expression."""
-        answer = self._do(
-            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
-        )
+        answer = self._do("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 

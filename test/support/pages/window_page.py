@@ -92,9 +92,7 @@ class WindowCase(unittest.TestCase):
 
     def wait_until_seen(self, color, pixels):
         """Waits until more than `pixels` of the picture have a colour."""
-        wait_for(
-            lambda: count(self.view(), color) > pixels, f"{color} of more than {pixels} pixels"
-        )
+        wait_for(lambda: count(self.view(), color) > pixels, f"{color} of more than {pixels} pixels")
 
     def wait_until_gone(self, color):
         """Waits until nothing of the picture has a colour."""

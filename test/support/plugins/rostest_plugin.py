@@ -100,8 +100,7 @@ def time_limit(path: Path) -> float:
     """Return how long a file may take: its tests one after the other, and a margin [s]."""
     tests = ElementTree.parse(path).iter("test")
     each = (
-        float(test.get("time-limit", DEFAULT_TIME_LIMIT)) * (1 + int(test.get("retry", 0)))
-        for test in tests
+        float(test.get("time-limit", DEFAULT_TIME_LIMIT)) * (1 + int(test.get("retry", 0))) for test in tests
     )
     return sum(each) + MARGIN
 

@@ -74,9 +74,7 @@ def scenario(request: pytest.FixtureRequest) -> Iterator[Scenario]:
     request.node.user_properties += [("stress", asdict(row)) for row in made.rows]
 
 
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config
-) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Print the table of a stress run, and write it to .ws/stress/table.md."""
     if not is_asked_for(config):
         return

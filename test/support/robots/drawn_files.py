@@ -173,9 +173,7 @@ def _sdf_shapes(draw: Draw, version: str, frames: list[str]) -> str:
     return "".join(shapes)
 
 
-def _sdf_joint(
-    draw: Draw, version: str, name: str, parent: str, child: str, frames: list[str]
-) -> str:
+def _sdf_joint(draw: Draw, version: str, name: str, parent: str, child: str, frames: list[str]) -> str:
     kind = draw(st.sampled_from(["fixed", "revolute", "prismatic"]))
     pose = _pose(draw, version, frames)
     axis = ""

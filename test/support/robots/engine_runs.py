@@ -128,9 +128,9 @@ def control(sim: Simulator) -> tuple:
 
 def _held(state: np.ndarray, force: float, step: float) -> np.ndarray:
     """The equations of motion over one step, the force held."""
-    return solve_ivp(
-        lambda _, y: PLANT.derivative(y, force), (0.0, step), state, rtol=1e-9, atol=1e-12
-    ).y[:, -1]
+    return solve_ivp(lambda _, y: PLANT.derivative(y, force), (0.0, step), state, rtol=1e-9, atol=1e-12).y[
+        :, -1
+    ]
 
 
 def _limited(force: float, state: np.ndarray) -> float:
@@ -184,9 +184,7 @@ def energy(state: list[float]) -> float:
     return kinetic / 2 + PLANT.pole * GRAVITY * PLANT.length * math.cos(angle)
 
 
-def energy_error(
-    new_engine: Callable[[], Engine], step: float, seconds: float
-) -> tuple[float, float]:
+def energy_error(new_engine: Callable[[], Engine], step: float, seconds: float) -> tuple[float, float]:
     """Of a free swing of cart and pole, from 2 rad: largest change of the energy, and the drift of its
     mean from the first to the last second; both as parts of m g l."""
     run = Run(new_engine(), step, (0.0, 0.0, math.pi - 2.0, 0.0))

@@ -18,9 +18,7 @@ FIXED = '<link name="world"/>' + JOINT.format("stand", "fixed", "world", "base",
 
 
 def robot(*parts: str, name: str = "theirs") -> str:
-    return (
-        f'<robot name="{name}" xmlns:xacro="http://www.ros.org/wiki/xacro">{"".join(parts)}</robot>'
-    )
+    return f'<robot name="{name}" xmlns:xacro="http://www.ros.org/wiki/xacro">{"".join(parts)}</robot>'
 
 
 NOBODYS = '<collision><geometry><mesh filename="package://nobodys/rod.stl"/></geometry></collision>'

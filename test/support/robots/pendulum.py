@@ -14,9 +14,7 @@ FILES = Path(__file__).resolve().parents[2] / "data" / "robots"
 STRONGEST = 0.5  # [N m]
 MOTOR = "hinge_effort_controller"
 
-PENDULUM = Robot(
-    urdf=FILES / "pendulum.urdf", controllers=FILES / "pendulum.yaml", run=(MOTOR,), world=None
-)
+PENDULUM = Robot(urdf=FILES / "pendulum.urdf", controllers=FILES / "pendulum.yaml", run=(MOTOR,), world=None)
 
 
 class Upright(Task):

@@ -121,9 +121,7 @@ class Watch(Task):
         return 0.0
 
 
-def make_rig(
-    backend: str = "bullet", joints: dict[str, Any] | None = None, **options: Any
-) -> RobotEnv:
+def make_rig(backend: str = "bullet", joints: dict[str, Any] | None = None, **options: Any) -> RobotEnv:
     """The rig alone."""
     return RobotEnv(RIG, Watch(joints=joints), backend, **options)
 

@@ -21,9 +21,7 @@ def inertial(mass: object = 1.0, com: str = "0 0 0", moment: object = 0.1) -> st
     )
 
 
-def link(
-    name: str, mass: object = 1.0, com: str = "0 0 0", moment: object = 0.1, more: str = ""
-) -> str:
+def link(name: str, mass: object = 1.0, com: str = "0 0 0", moment: object = 0.1, more: str = "") -> str:
     return f'<link name="{name}">{inertial(mass, com, moment)}{more}</link>'
 
 

@@ -74,6 +74,4 @@ class Rig:
 def move(*points, names=("shoulder",), stamp=0):
     """Points are (time [s], positions) at rest."""
     rest = (0.0,) * len(names)
-    return Trajectory(
-        names, [TrajectoryPoint(round(t * S), p, rest, rest) for t, p in points], stamp
-    )
+    return Trajectory(names, [TrajectoryPoint(round(t * S), p, rest, rest) for t, p in points], stamp)

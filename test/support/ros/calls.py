@@ -13,9 +13,7 @@ from geometry_msgs.msg import Point, Pose
 from std_srvs.srv import Empty
 
 BOUND = 60.0  # [s of wall time]
-KINDS = dict.fromkeys(
-    ["pause_physics", "unpause_physics", "reset_world", "reset_simulation"], Empty
-) | {
+KINDS = dict.fromkeys(["pause_physics", "unpause_physics", "reset_world", "reset_simulation"], Empty) | {
     "spawn_urdf_model": gazebo_msgs.srv.SpawnModel,
     "spawn_sdf_model": gazebo_msgs.srv.SpawnModel,
     "clear_joint_forces": gazebo_msgs.srv.JointRequest,

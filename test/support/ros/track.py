@@ -37,9 +37,7 @@ class Track:
         with self.sim.lock:
             self.sim.advance(ticks)
 
-    def command(
-        self, linear: float, angular: float, topic: str = "/cmd_vel", y: float = 0.0
-    ) -> None:
+    def command(self, linear: float, angular: float, topic: str = "/cmd_vel", y: float = 0.0) -> None:
         message = Twist()
         message.linear.x, message.linear.y, message.angular.z = linear, y, angular
         SilentSubscriber.send(topic, message)

@@ -16,9 +16,7 @@ def link(name: str, shape: str, mass: float, at: str = "0 0 0", turned: str = "0
 
 def joint(name: str, kind: str, parent: str, child: str, at: str, axis: str = "0 1 0") -> str:
     """A joint, with limits where it turns between some."""
-    limit = (
-        '<limit lower="-2.5" upper="2.5" effort="60" velocity="8"/>' if kind == "revolute" else ""
-    )
+    limit = '<limit lower="-2.5" upper="2.5" effort="60" velocity="8"/>' if kind == "revolute" else ""
     return f"""<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
   <origin xyz="{at}"/><axis xyz="{axis}"/>{limit}<dynamics damping="0.02"/></joint>"""
 

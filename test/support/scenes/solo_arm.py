@@ -9,9 +9,7 @@ from support.scenes.two_arms import LEFT, arm
 
 from robot_envs import Commands, GoalTask, Robot, RobotEnv, Task, WorldState
 
-SOLO: Robot = replace(
-    LEFT, urdf=arm("", "Position", "Position"), namespace="", name="arm", world="empty"
-)
+SOLO: Robot = replace(LEFT, urdf=arm("", "Position", "Position"), namespace="", name="arm", world="empty")
 
 
 class Hold(Task):

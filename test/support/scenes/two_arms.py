@@ -159,9 +159,7 @@ class Volley(Task):
         for each in state.contacts:
             force = [a + b for a, b in zip(force, each.total[0], strict=True)]
         ball = state.models["ball"]
-        return np.array(
-            [*joints, *tips, *force, *ball.pose.position, state.time, len(state.contacts)]
-        )
+        return np.array([*joints, *tips, *force, *ball.pose.position, state.time, len(state.contacts)])
 
     def reward(self, state: WorldState, action: np.ndarray) -> float:
         return -state.models["ball"].pose.position[0]

@@ -35,9 +35,7 @@ def _hello(dice: random.Random) -> bytes:
     fields = [b"callerid=/bad", b"md5sum=*", b"service=" + SERVICE.encode(), b"persistent=1"]
     if dice.random() < 0.5:
         at = dice.randrange(len(fields))
-        fields[at] = dice.choice(
-            [b"", b"=", b"x", b"md5sum=", b"service=/none", dice.randbytes(20)]
-        )
+        fields[at] = dice.choice([b"", b"=", b"x", b"md5sum=", b"service=/none", dice.randbytes(20)])
     return header(*fields)
 
 

@@ -53,9 +53,7 @@ WORDS = [
 NUMBERS = st.integers(-(2**31), 2**31 - 1) | st.floats()
 ARGUMENTS = st.recursive(
     st.sampled_from(WORDS) | NUMBERS | st.text(max_size=8) | st.booleans() | st.binary(max_size=9),
-    lambda inner: (
-        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3)
-    ),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
     max_leaves=6,
 )
 Call = Callable[[], object]

@@ -50,9 +50,7 @@ class Forked:
     `limits` are by their numbers in `resource`; RLIMIT_AS is what it may take besides.
     """
 
-    def __init__(
-        self, arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None
-    ) -> None:
+    def __init__(self, arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "output.txt"
         self._arguments = arguments
@@ -130,9 +128,7 @@ def _size() -> int:
 
 
 @contextlib.contextmanager
-def forked(
-    arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None
-) -> Iterator[Forked]:
+def forked(arguments: list[str], folder: Path, limits: Mapping[int, int] | None = None) -> Iterator[Forked]:
     """One for the length of a block; nothing of it outlives that."""
     training = Forked(arguments, folder, limits)
     try:

@@ -29,8 +29,7 @@ class Usage(NamedTuple):
 
     def __str__(self) -> str:
         return (
-            f"{self.memory:.0f} MiB, {self.threads} threads, {self.files} files,"
-            f" {self.temporary} temporary"
+            f"{self.memory:.0f} MiB, {self.threads} threads, {self.files} files, {self.temporary} temporary"
         )
 
 

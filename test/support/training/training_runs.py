@@ -23,9 +23,7 @@ from rl_workbench.training.train import choose
 from rl_workbench.training.training import Training
 
 EXACT = ("dqn", "reinforce", "reinforce-document")  # our own; they need no extras
-OTHERS = [
-    pytest.param(name, marks=pytest.mark.extras("stable_baselines3")) for name in ("ppo", "sac")
-]
+OTHERS = [pytest.param(name, marks=pytest.mark.extras("stable_baselines3")) for name in ("ppo", "sac")]
 ALL = [*EXACT, *OTHERS]
 
 CLOCKED = "charts/SPS"  # the only tag whose values depend on the wall clock

@@ -19,9 +19,7 @@ def boxes(monkeypatch):
     """Those of a process without a node; what is diverted can be looked at."""
     diverted = {}
     monkeypatch.setattr(module, "divert_messages", lambda sink: diverted.update(sink=sink))
-    monkeypatch.setattr(
-        module, "divert_connections", lambda node, sink: diverted.update({node: sink})
-    )
+    monkeypatch.setattr(module, "divert_connections", lambda node, sink: diverted.update({node: sink}))
     monkeypatch.setattr(module, "on_topics_changed", lambda call: diverted.update(changed=call))
     monkeypatch.setattr(module, "publish_without_yielding", lambda: None)
     topics = {"/a": [SimpleNamespace(endpoint_id="/script")]}

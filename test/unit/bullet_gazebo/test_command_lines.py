@@ -128,9 +128,7 @@ def test_another_window_keeps_its_name(line, dead, living, anonymous, master, mo
 
 
 @pytest.mark.parametrize(("fault", "warns"), [(ServiceGone, False), (ServiceFailed, True)])
-def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(
-    monkeypatch, fault, warns
-):
+def test_a_spawner_that_ends_with_the_simulator_has_nothing_to_complain_of(monkeypatch, fault, warns):
     """roslaunch and rostest end both at the same time."""
 
     class Manager:

@@ -159,9 +159,7 @@ def test_a_plugins_log_level_is_its_own(track):
     assert levels[0] == logging.DEBUG < levels[1]
 
 
-@pytest.mark.parametrize(
-    "library", ["libgazebo_ros_skid_steer_drive.so", "libgazebo_ros_planar_move.so"]
-)
+@pytest.mark.parametrize("library", ["libgazebo_ros_skid_steer_drive.so", "libgazebo_ros_planar_move.so"])
 def test_topics_lie_in_the_robots_namespace(track, library):
     elements = {"wheelSeparation": TRACK, "wheelDiameter": 2.0 * RADIUS, "broadcastTF": 1}
     track.spawn(four_wheels(**{library: elements}), "/rover")
@@ -171,10 +169,7 @@ def test_topics_lie_in_the_robots_namespace(track, library):
 
 
 LIBRARIES = {
-    **{
-        f"libgazebo_ros_{kind}_drive.so": "updateRate"
-        for kind in ("diff", "skid_steer", "tricycle")
-    },
+    **{f"libgazebo_ros_{kind}_drive.so": "updateRate" for kind in ("diff", "skid_steer", "tricycle")},
     "libgazebo_ros_planar_move.so": "odometryRate",
     "libhector_gazebo_ros_force_based_move.so": "odometryRate",
     "libgazebo_ros_kobuki.so": "update_rate",
@@ -226,9 +221,7 @@ def test_four_wheels_drive_straight_and_turn_by_slipping(track):
     assert track.stamps("/odom")[-1] == 91
 
 
-@pytest.mark.parametrize(
-    "library", ["libgazebo_ros_planar_move.so", "libridgeback_ros_force_based_move.so"]
-)
+@pytest.mark.parametrize("library", ["libgazebo_ros_planar_move.so", "libridgeback_ros_force_based_move.so"])
 def test_a_body_is_moved_in_its_own_axes(track, library):
     elements = {"x_velocity_p_gain": 1000, "y_velocity_p_gain": 1000}
     track.spawn(three_balls(**{library: elements}))

@@ -42,15 +42,11 @@ def test_no_model_is_spawned_before_all_services_are_there(monkeypatch):
         assert gates[0].locked()
         return ["all others"]
 
-    monkeypatch.setattr(
-        gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate) or Mock()
-    )
+    monkeypatch.setattr(gzserver, "SpawnServices", lambda sim, plugins, gate: gates.append(gate) or Mock())
     monkeypatch.setattr(gzserver, "advertise_world_services", others)
     node = gzserver.GazeboNode.__new__(gzserver.GazeboNode)
     node.sim, node._watchdog, node.journal = SimpleNamespace(lockstep=False), Mock(), None
-    node._advertise(
-        True, argparse.Namespace(seed=0, camera_scale=1.0, renderer="rays"), of_world=[]
-    )
+    node._advertise(True, argparse.Namespace(seed=0, camera_scale=1.0, renderer="rays"), of_world=[])
     assert node._services[-1] == "all others" and not gates[0].locked()
 
 

@@ -34,8 +34,7 @@ def test_what_is_no_command_is_answered_with_the_usage(main, name, line, capsys)
 
 
 EFFORT, VELOCITY, STATE = (
-    f"hardware_interface::{kind}Interface"
-    for kind in ("EffortJoint", "VelocityJoint", "JointState")
+    f"hardware_interface::{kind}Interface" for kind in ("EffortJoint", "VelocityJoint", "JointState")
 )
 
 

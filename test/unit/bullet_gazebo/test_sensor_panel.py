@@ -48,10 +48,7 @@ def test_a_range_is_a_sector():
 
 
 def test_of_a_cloud_the_finite_points_are_drawn_in_their_colours():
-    fields = [
-        PointField(name, at, PointField.FLOAT32, 1)
-        for name, at in zip("xyz", (0, 4, 8), strict=True)
-    ]
+    fields = [PointField(name, at, PointField.FLOAT32, 1) for name, at in zip("xyz", (0, 4, 8), strict=True)]
     coloured = [*fields, PointField("rgb", 16, PointField.UINT32, 1)]
     points = [(1.0, 2.0, 3.0, 0xFF8001), (math.nan, 0.0, 0.0, 0)]
     drawing = draw_cloud(point_cloud2.create_cloud(Header(), coloured, points))

@@ -24,9 +24,7 @@ ANY = st.recursive(
     SIMPLE, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner)
 )
 COMMANDS = st.sampled_from(["step", "pause", "unpause", "reset", "reset_models", "reset_time"])
-COUNTS = st.integers(-2, 3) | st.sampled_from(
-    [CHUNK + 1, 2**31 - 1, True, 1.0, 1.5, "1", b"1", None, [1]]
-)
+COUNTS = st.integers(-2, 3) | st.sampled_from([CHUNK + 1, 2**31 - 1, True, 1.0, 1.5, "1", b"1", None, [1]])
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +34,7 @@ def control():
     sim.world.close()
 
 
-@pytest.mark.parametrize(
-    "count", [1.5, 1.0, True, "1", None, [1], {"a": 1}, 0, -1, CHUNK + 1, 2**40]
-)
+@pytest.mark.parametrize("count", [1.5, 1.0, True, "1", None, [1], {"a": 1}, 0, -1, CHUNK + 1, 2**40])
 def test_a_number_of_steps_that_is_none_is_refused_and_the_world_stays(control, count) -> None:
     before = control._sim.now
     code, text, value = control.answer("step", count)

@@ -57,9 +57,7 @@ def episode(render_mode, **options):
     return np.array(seen), pictures
 
 
-@pytest.mark.parametrize(
-    "env_id", ["cartpole/Classic-v0", "robot_envs.robots:robot_envs/Hopper-v0"]
-)
+@pytest.mark.parametrize("env_id", ["cartpole/Classic-v0", "robot_envs.robots:robot_envs/Hopper-v0"])
 def test_pictures_are_collected_as_gymnasiums_are(env_id):
     env = gymnasium.make(env_id, render_mode="rgb_array_list", width=32, height=24)
     env.reset(seed=0)

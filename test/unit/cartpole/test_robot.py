@@ -86,9 +86,7 @@ def test_a_variation_is_felt_and_leaves_no_trace(backend):
     assert run(other) == nominal
 
 
-def test_a_blow_up_is_contained_and_leaves_nothing_behind_nor_does_a_state_that_is_none(
-    backend, caplog
-):
+def test_a_blow_up_is_contained_and_leaves_nothing_behind_nor_does_a_state_that_is_none(backend, caplog):
     with pytest.raises(TaskError, match="'cart_pole' is a finite position"):
         backend.reset(UPRIGHT._replace(pole_angle=math.nan))
     assert run(backend) == run(Plant())

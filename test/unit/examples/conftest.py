@@ -28,9 +28,7 @@ def printed() -> Callable[..., str]:
 
     def call(*words: object, **variables: str) -> str:
         examples = [EXAMPLES / each for each in map(str, words)]
-        words = [
-            file if file.is_file() else word for file, word in zip(examples, words, strict=True)
-        ]
+        words = [file if file.is_file() else word for file, word in zip(examples, words, strict=True)]
         own = {"ROS_MASTER_URI": f"http://127.0.0.1:{reserved_port()}", **variables}
         ended = run([sys.executable, *words], env={**os.environ, **own})
         assert ended.returncode == 0, ended.stdout + ended.stderr

@@ -16,9 +16,7 @@ def example(imported) -> Any:
     return imported("plan_with_snapshots")
 
 
-@pytest.mark.parametrize(
-    ("name", "fewer"), [("cart-pole", {"rounds": 1}), ("rover", {"plans": 8})], ids=str
-)
+@pytest.mark.parametrize(("name", "fewer"), [("cart-pole", {"rounds": 1}), ("rover", {"plans": 8})], ids=str)
 def test_it_gets_there(example: Any, name: str, fewer: dict[str, int], monkeypatch, capsys) -> None:
     """With less thought than it takes by itself."""
     monkeypatch.setitem(example.PROBLEMS, name, example.PROBLEMS[name]._replace(**fewer))
@@ -28,9 +26,7 @@ def test_it_gets_there(example: Any, name: str, fewer: dict[str, int], monkeypat
 
 
 def test_processes_find_the_same(example: Any, monkeypatch, capsys) -> None:
-    quick = example.PROBLEMS["rover"]._replace(
-        plans=5, horizon=3, is_done=lambda _, states: len(states) > 5
-    )
+    quick = example.PROBLEMS["rover"]._replace(plans=5, horizon=3, is_done=lambda _, states: len(states) > 5)
     monkeypatch.setitem(example.PROBLEMS, "rover", quick)
     said = []
     for count in ("1", "2"):

@@ -151,8 +151,7 @@ def test_many_at_once(bad):
     path = bad('<xacro:arg name="n" default=""/><link name="l$(arg n)"/>')
     texts = {}
     threads = [
-        threading.Thread(target=lambda n=n: texts.update({n: expand(path, {"n": str(n)})}))
-        for n in range(8)
+        threading.Thread(target=lambda n=n: texts.update({n: expand(path, {"n": str(n)})})) for n in range(8)
     ]
     for each in threads:
         each.start()

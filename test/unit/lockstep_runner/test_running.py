@@ -25,9 +25,7 @@ def run(tmp_path, monkeypatch):
 
 
 def test_it_is_main_with_its_arguments(run, tmp_path):
-    names = run(
-        "import sys\nargv = sys.argv\nname = __name__\nplace = sys.path[0]\n", "--seed", "5"
-    )
+    names = run("import sys\nargv = sys.argv\nname = __name__\nplace = sys.path[0]\n", "--seed", "5")
     assert names["argv"] == [str(tmp_path / "script.py"), "--seed", "5"]
     assert (names["name"], names["place"]) == ("__main__", str(tmp_path))
     assert names["__file__"] == str(tmp_path / "script.py")

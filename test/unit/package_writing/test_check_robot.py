@@ -139,9 +139,7 @@ def test_a_file_that_cannot_be_used_is_one_line(check, name, text, fault):
     assert fault in refused and refused.startswith("check_robot: ") and refused.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    "given", ["nowhere.urdf", "no_such_package", "package://no_such_package/a.urdf"]
-)
+@pytest.mark.parametrize("given", ["nowhere.urdf", "no_such_package", "package://no_such_package/a.urdf"])
 def test_what_is_not_there_is_one_line(check, given):
     assert check(given) == (2, "", f"check_robot: {given}: there is no such file or package\n")
 

@@ -147,9 +147,7 @@ def test_meshes_of_one_name_stay_apart(tmp_path):
     urdf.write_text(robot(LINK.format("base", shapes)))
     copied = copy_urdf(urdf, {}, "mine", tmp_path / "mine", standalone=True)
     places = re.findall('filename="package://mine/(.*?)"', copied.xml)
-    assert places == [
-        f"meshes/{name}" for name in ("base.stl", "cup.obj", "2/base.stl", "2/cup.obj")
-    ]
+    assert places == [f"meshes/{name}" for name in ("base.stl", "cup.obj", "2/base.stl", "2/cup.obj")]
     for size, place, owner in ((1, "meshes", "arm"), (2, "meshes/2", "gripper")):
         folder = tmp_path / "mine" / place
         assert (folder / "base.stl").read_bytes() == binary_stl(size)

@@ -88,9 +88,7 @@ WALKERS = {  # joints and mass [kg]
 @pytest.mark.parametrize(
     "file, arguments",
     [
-        pytest.param(
-            *each[:1], each[1:], marks=() if number < 2 else pytest.mark.long, id=" ".join(each)
-        )
+        pytest.param(*each[:1], each[1:], marks=() if number < 2 else pytest.mark.long, id=" ".join(each))
         for number, each in enumerate(WALKERS)
     ],
 )

@@ -139,9 +139,7 @@ def test_wheels_that_turn_the_other_way_get_a_velocity_each(new):
     mirrored = [each.replace("0 1 0", "0 -1 0") for each in ROVER]
     words = ("--base", "free", "--passive", "swivel")
     folder, made, task, told = new("my_mirror", robot(*mirrored), *words)
-    wheels = dict.fromkeys(
-        ["left_wheel", "right_wheel"], "velocity_controllers/JointVelocityController"
-    )
+    wheels = dict.fromkeys(["left_wheel", "right_wheel"], "velocity_controllers/JointVelocityController")
     pan = {"pan": "effort_controllers/JointPositionController"}
     assert controllers_of(folder) == wheels | pan
     assert "get a velocity controller, as wheels: left_wheel, right_wheel" in told

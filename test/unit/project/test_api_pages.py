@@ -29,9 +29,7 @@ SINGLE_WORDS = {"Reading", "Twist"}  # also words of ROS
 @pytest.fixture(scope="module")
 def entries(root):
     """Objects with an entry, by their names."""
-    table = re.search(
-        r"^API=\((.*?)^\)", (root / "tools/ws_docs.sh").read_text(), re.MULTILINE | re.DOTALL
-    )
+    table = re.search(r"^API=\((.*?)^\)", (root / "tools/ws_docs.sh").read_text(), re.MULTILINE | re.DOTALL)
     found = {}
     for name in re.findall(r"[\w.]+", table[1]):
         parent, _, last = name.rpartition(".")

@@ -92,9 +92,7 @@ for name in {WITHOUT_ROS!r}:
         ("cartpole.policy_node", {"torch"}),
     ],
 )
-def test_an_import_leaves_out_what_takes_seconds(
-    modules: str, absent: set[str], monkeypatch
-) -> None:
+def test_an_import_leaves_out_what_takes_seconds(modules: str, absent: set[str], monkeypatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert not loaded_by(modules) & absent
 

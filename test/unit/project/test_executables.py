@@ -32,9 +32,7 @@ def start(tmp_path):
     def start(name, port):
         arguments, _ = PROGRAMS[name]
         master = {"ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
-        environment = (
-            os.environ | master | dict.fromkeys(("ROS_HOME", "ROS_LOG_DIR"), str(tmp_path))
-        )
+        environment = os.environ | master | dict.fromkeys(("ROS_HOME", "ROS_LOG_DIR"), str(tmp_path))
         program = subprocess.Popen(
             [sys.executable, "-c", MAIN.format(*name.split()), *arguments],
             env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

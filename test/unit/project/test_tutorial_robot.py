@@ -24,9 +24,7 @@ from support.python import run
 from cartpole import workbench
 
 ROOT = Path(__file__).resolve().parents[3]
-ARM, VEHICLE, TESTS = (
-    ROOT / "docs" / f"{name}.md" for name in ("tutorial_robot", "mobile", "testing")
-)
+ARM, VEHICLE, TESTS = (ROOT / "docs" / f"{name}.md" for name in ("tutorial_robot", "mobile", "testing"))
 LIMIT = 300.0  # [s] for one command
 SHORT = "--total-timesteps 150 --eval-frequency 150 --eval-episodes 1 --confirm-episodes 1"
 SHORTER = {

@@ -51,9 +51,7 @@ def test_two_users_of_one_checkout_have_masters_of_their_own(foreign, nobody):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("variable", "place"), [("HOME", "own/.cache/cartpole"), ("CARTPOLE_WS_DIR", "own")]
-)
+@pytest.mark.parametrize(("variable", "place"), [("HOME", "own/.cache/cartpole"), ("CARTPOLE_WS_DIR", "own")])
 def test_what_cannot_be_made_in_the_checkout_is_made_elsewhere(foreign, nobody, variable, place):
     result = nobody(foreign / "checkout/ws", "true", **{variable: str(foreign / "own")})
     assert result.returncode == 1
@@ -152,9 +150,7 @@ def test_a_checkout_that_was_moved_is_made_ready_again(ws, root, tmp_path):
     for place in ("here", "dort drüben"):
         copy = (tmp_path / "here").rename(tmp_path / place)
         code = "import ros_utils, sys; print(sys.prefix, ros_utils.__file__, sep='\\n')"
-        built = ws(
-            "bash", "-c", f'rospack find gazebo_ros && python3 -c "{code}"', script=copy / "ws"
-        )
+        built = ws("bash", "-c", f'rospack find gazebo_ros && python3 -c "{code}"', script=copy / "ws")
         assert built.returncode == 0, built.stderr
         found = [Path(each).resolve() for each in built.stdout.splitlines()]
         assert len(found) == 3 and all(each.is_relative_to(copy) for each in found)

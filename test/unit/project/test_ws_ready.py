@@ -50,9 +50,7 @@ for step in companions build; do hash_of "$step"; done"""
 def test_what_is_ready_is_ready_in_every_language(root, tmp_path):
     """Languages sort names differently: by this one Z goes before a."""
     tool = tmp_path / "sort"
-    tool.write_text(
-        '#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n'
-    )
+    tool.write_text('#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n')
     tool.chmod(0o755)
     plain = {"PATH": f"{tmp_path}:/usr/bin:/bin", "ROOT": str(root)}
     found = {
@@ -159,9 +157,8 @@ def test_a_step_that_takes_long_says_how_far_it_is(root, tmp_path):
     assert re.fullmatch(r"ws: \[1/1\] the step: done in \d+ s\n", told[-2])
     assert re.fullmatch(r"ws: ready after \d+ s, go on\n", told[-1])
     assert (
-        (tmp_path / ".ws/log/one.log").read_text()
-        == "half way\nFound existing installation: numpy\nCan't uninstall 'numpy'\nthrough\n"
-    )
+        tmp_path / ".ws/log/one.log"
+    ).read_text() == "half way\nFound existing installation: numpy\nCan't uninstall 'numpy'\nthrough\n"
 
 
 def test_what_a_killed_ws_leaves_running_keeps_the_lock(root, tmp_path):

@@ -17,9 +17,7 @@ pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@example.com">a</maintainer><license>BSD</license>
 <buildtool_depend>catkin</buildtool_depend>{depends}</package>"""
-CMAKE = (
-    "cmake_minimum_required(VERSION 3.10)\nproject({name})\nfind_package(catkin REQUIRED{needs})\n"
-)
+CMAKE = "cmake_minimum_required(VERSION 3.10)\nproject({name})\nfind_package(catkin REQUIRED{needs})\n"
 MESSAGES = "catkin_python_setup()\nadd_message_files(FILES Tip.msg)\ngenerate_messages()\ncatkin_package()\n"
 SETUP = """from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
@@ -232,9 +230,7 @@ def test_packages_of_descriptions_are_found_by_cmake_and_not_built(ws, tmp_path)
 
 def test_packages_for_ros_2_are_used_for_their_files(ws, tmp_path):
     ament = "<export><build_type{}>ament_cmake</build_type></export>"
-    package(
-        tmp_path, "other_description", "find_package(ament_cmake REQUIRED)\n", more=ament.format("")
-    )
+    package(tmp_path, "other_description", "find_package(ament_cmake REQUIRED)\n", more=ament.format(""))
     package(tmp_path, "gazebo_msgs", more=ament.format(""))
     both = package(tmp_path, "for_both", "add_custom_target(x)\n")
     text = XML.format(name="for_both", depends=ament.format(' condition="$ROS_VERSION == 2"'))
@@ -286,9 +282,7 @@ make_theirs_ready ''
         ("add_library(x x.cpp)\n", "", ""),
     ],
 )
-def test_a_compiler_comes_with_the_first_package_that_is_built(
-    root, tmp_path, cmake, missing, made
-):
+def test_a_compiler_comes_with_the_first_package_that_is_built(root, tmp_path, cmake, missing, made):
     package(tmp_path / "theirs", "mine", cmake)
     (tmp_path / "ws/stamp").mkdir(parents=True)
     for name in ("companions", "build"):

@@ -71,9 +71,7 @@ def test_a_camera_of_ones_own_looks_where_it_should():
         picture.close()
 
 
-@pytest.mark.parametrize(
-    "colour", ["1 1 1 1", "0.6 0.6 0.6 1", "0.05 0.05 0.05 1", "0.9 0.92 0.95 1"]
-)
+@pytest.mark.parametrize("colour", ["1 1 1 1", "0.6 0.6 0.6 1", "0.05 0.05 0.05 1", "0.9 0.92 0.95 1"])
 def test_a_robot_stands_out_from_the_ground(colour):
     """Seen from above, where all around it is ground."""
     robot = dataclasses.replace(

@@ -81,9 +81,7 @@ def test_a_world_of_joints_alone_rewards_nothing_and_says_so() -> None:
 
 
 BOX3 = Box(-np.inf, np.inf, (3,), np.float64)
-HIT = np.array(
-    [0.3, 0.3, 0.6, 0.0]
-)  # the right arm swings to the left, through where the ball lies
+HIT = np.array([0.3, 0.3, 0.6, 0.0])  # the right arm swings to the left, through where the ball lies
 
 
 @pytest.fixture
@@ -215,9 +213,7 @@ def test_the_rover_rolls_to_the_crate_and_pushes_it(make):
 
 
 @pytest.mark.parametrize("name", ["arms", "rover"])
-@pytest.mark.parametrize(
-    "engine", ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
-)
+@pytest.mark.parametrize("engine", ["bullet", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))])
 def test_the_same_seed_gives_the_same_bits_whatever_was_before(make, name, engine):
     first, again, other = (make(name, backend=engine) for _ in range(3))
     rollout(again, 30, seed=9)

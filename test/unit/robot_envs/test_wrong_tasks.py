@@ -86,9 +86,7 @@ TASKS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "method", ["apply", "observe", "reward", "is_terminal", "info", "initial_state"]
-)
+@pytest.mark.parametrize("method", ["apply", "observe", "reward", "is_terminal", "info", "initial_state"])
 def test_a_tasks_own_error_comes_through_as_it_is(method):
     with pytest.raises(ZeroDivisionError, match="the user's own"):
         episode(task=Hold(**{method: fails}))

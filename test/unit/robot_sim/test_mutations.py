@@ -7,9 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from support.mutations.models import CASES, CONTROLLERS, spawn
 
 EXAMPLES = {"xacro": 8}  # each takes a process; of the others 150
-QUICK = settings(
-    deadline=None, database=None, derandomize=True, suppress_health_check=[*HealthCheck]
-)
+QUICK = settings(deadline=None, database=None, derandomize=True, suppress_health_check=[*HealthCheck])
 
 
 @pytest.mark.slow

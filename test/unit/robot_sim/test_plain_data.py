@@ -92,9 +92,7 @@ def test_a_class_that_is_not_imported_stays_a_record_until_it_is():
         resolve([Record("some\nmodule", "Class", [])])
 
 
-@pytest.mark.parametrize(
-    "value", [{1, 2}, open, object(), lambda: 1, sys, {"a": [random.Random()]}]
-)
+@pytest.mark.parametrize("value", [{1, 2}, open, object(), lambda: 1, sys, {"a": [random.Random()]}])
 def test_what_is_not_plain_is_refused(value):
     with pytest.raises(StateError, match="isn't plain data"):
         pack(value)
@@ -132,9 +130,7 @@ FORGED = {
     "an ordered dictionary": extension(4, ["collections", "OrderedDict", {"a": 1}]),
     "a dictionary with a factory": extension(4, ["collections", "defaultdict", {"a": 1}]),
     "long lists in long lists": (b"\xdd" + struct.pack(">I", 2**22)) * 500,
-    "lists in lists, and in tuples": lists(
-        900, b"\xc7" + struct.pack(">BB", 3, 1) + lists(2, b"\xc0")
-    ),
+    "lists in lists, and in tuples": lists(900, b"\xc7" + struct.pack(">BB", 3, 1) + lists(2, b"\xc0")),
     "a record as a key": b"\x81" + extension(4, [__name__, "Hashed", [1]]) + b"\xc0",
     "integers with one hash": alike([each * (2**61 - 1) for each in range(1, 20_000)]),
     "tuples with one hash": alike([*itertools.product((-1, -2), repeat=14)]),

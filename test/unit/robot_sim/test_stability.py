@@ -75,9 +75,7 @@ def bound(kind, share_of_d, step, damping=0.0, implicit=False):
     ("kind", "share_of_d"), [(POSITION, 0.0), (POSITION, 0.5), (POSITION, 0.99), (VELOCITY, 0.0),
                              (VELOCITY, 0.3)]
 )  # fmt: skip
-def test_a_loop_beyond_the_bound_is_softened_and_told_and_one_below_is_neither(
-    rig, kind, share_of_d, step
-):
+def test_a_loop_beyond_the_bound_is_softened_and_told_and_one_below_is_neither(rig, kind, share_of_d, step):
     p, d = bound(kind, share_of_d, step)
     first, most, last, told = swing(rig, {"p": 0.97 * p, "d": 0.97 * d}, step, EXACT, kind)
     assert last <= most < 10.0 * first

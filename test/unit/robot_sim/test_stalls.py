@@ -122,9 +122,7 @@ def folding(gains, goals, collide="true"):
     return lead
 
 
-@pytest.mark.parametrize(
-    "gains", [{"p": 60, "d": 3}, {"p": 1000, "d": 50}], ids=["weak", "softened"]
-)
+@pytest.mark.parametrize("gains", [{"p": 60, "d": 3}, {"p": 1000, "d": 50}], ids=["weak", "softened"])
 def test_what_its_own_links_hold_off_its_goal_is_told_below_the_limit_too(make_world, gains):
     """The motor's effort never got to its limit: p is low, or the effort is softened for the step."""
     robot = folding(gains, FOLDED)(make_world())

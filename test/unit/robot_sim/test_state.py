@@ -139,9 +139,7 @@ def test_shapes_of_every_kind_are_told_apart(world, root, shape):
     while not (contacts := reader.read().contacts):
         world.step()
         assert world.models["box"].state()[0].position[2] > 0.0
-    assert {pair.first for pair in contacts} == {
-        "box::box::box_fixed_joint_lump__upper_collision_1"
-    }
+    assert {pair.first for pair in contacts} == {"box::box::box_fixed_joint_lump__upper_collision_1"}
 
 
 def test_a_fall_is_told_from_the_first_touch_on(scene):

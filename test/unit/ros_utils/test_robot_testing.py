@@ -162,9 +162,7 @@ def test_a_failure_is_told_though_it_cant_be_recorded(tmp_path):
     (tmp_path / "test_cart.py").write_text(FAILING)
     (tmp_path / "file").touch()
     place = str(tmp_path / "file/failures")
-    done = run(
-        tmp_path, "-m", "pytest", "-k", "gets_there", "test_cart.py", ROS_TEST_FAILURES=place
-    )
+    done = run(tmp_path, "-m", "pytest", "-k", "gets_there", "test_cart.py", ROS_TEST_FAILURES=place)
     assert "0.2 ± 0.02 m was wanted" in done.stdout and "1 failed" in done.stdout, done.stdout
     assert f"not recorded: [Errno 20] Not a directory: '{place}" in done.stdout
 

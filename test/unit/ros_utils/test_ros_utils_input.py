@@ -60,9 +60,7 @@ def test_no_master(no_master, parameters, slept, capsys, call):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("call", [*CALLS[:2], lambda path: ros_gazebo.launch_Gazebo(gui=False)])
-def test_a_master_that_does_not_answer(
-    nobody_answers, parameters, monkeypatch, tmp_path, capsys, call
-):
+def test_a_master_that_does_not_answer(nobody_answers, parameters, monkeypatch, tmp_path, capsys, call):
     monkeypatch.setenv("ROS_MASTER_URI", nobody_answers)
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     assert call(parameters) is False
@@ -165,9 +163,7 @@ def test_a_pose_that_is_not_finite_is_refused(number):
     ("asked", "passed"),
     [({"seed": 0}, {"seed:=0"}), ({"seed": 7, "lockstep": True}, {"seed:=7", "lockstep:=True"}), ({}, set())],
 )  # fmt: skip
-def test_gazebo_gets_the_arguments_beyond_its_own_that_are_asked_for(
-    no_master, monkeypatch, asked, passed
-):
+def test_gazebo_gets_the_arguments_beyond_its_own_that_are_asked_for(no_master, monkeypatch, asked, passed):
     commands = []
 
     def start(command, *_):

@@ -118,9 +118,7 @@ def test_names_of_this_machine_mean_the_same_master(monkeypatch):
     assert _programs.started() == [handle.start]
 
 
-@pytest.mark.parametrize(
-    ("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)]
-)
+@pytest.mark.parametrize(("trap", "number"), [("INT", signal.SIGTERM), ("INT TERM", signal.SIGKILL)])
 def test_a_stubborn_program_is_ended(place, monkeypatch, trap, number):
     monkeypatch.setitem(_processes.END_PATIENCE, "node", 0.3)
     monkeypatch.setattr(_processes, "AFTER_TERM", 0.3 if number == signal.SIGKILL else BOUND)

@@ -48,9 +48,7 @@ ARGUMENTS = {
     "joint_names": ["j"],
     "joint_positions": [0.0],
     "controllers_file": None,
-    **dict.fromkeys(
-        ["controller_list", "spawn_controllers", "kill_controllers", "reset_controllers"], ["c"]
-    ),
+    **dict.fromkeys(["controller_list", "spawn_controllers", "kill_controllers", "reset_controllers"], ["c"]),
     **dict.fromkeys(["start_controllers", "stop_controllers"], ["c"]),
     **dict.fromkeys(["auto_disable_bodies", "sor_pgs_precon_iters", "sor_pgs_iters"], 0),
     **dict.fromkeys(["x", "y", "z", "max_update_rate", "new_time_step", "effort", "duration"], 1.0),

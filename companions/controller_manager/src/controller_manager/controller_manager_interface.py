@@ -43,9 +43,7 @@ def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
     """
     print(f"Restore: {restore}")
     before = loaded_controllers() if restore else []
-    reloaded = bool(
-        _call("reload_controller_libraries", srv.ReloadControllerLibraries, force_kill).ok
-    )
+    reloaded = bool(_call("reload_controller_libraries", srv.ReloadControllerLibraries, force_kill).ok)
     if reloaded:
         print("Successfully reloaded libraries")
     else:

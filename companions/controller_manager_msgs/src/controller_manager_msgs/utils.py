@@ -28,14 +28,11 @@ SERVICES = {
 def is_controller_manager(namespace: str) -> bool:
     """Returns whether a namespace has all six services of a manager, with their types."""
     return all(
-        _type_of(rospy.names.ns_join(namespace, name)) == kind._type
-        for name, kind in SERVICES.items()
+        _type_of(rospy.names.ns_join(namespace, name)) == kind._type for name, kind in SERVICES.items()
     )
 
 
-def get_controller_managers(
-    namespace: str = "/", initial_guess: Iterable[str] | None = None
-) -> list[str]:
+def get_controller_managers(namespace: str = "/", initial_guess: Iterable[str] | None = None) -> list[str]:
     """Returns the namespaces of all managers in or below a namespace, sorted.
 
     Args:

@@ -42,9 +42,7 @@ LOSSES = {  # Stable-Baselines3's names: our tags
 def make(options: TrainingOptions, envs: list[Any]) -> "SB3Training":
     """Makes a new training; see `algorithm`."""
     if not options.run.total_timesteps:
-        raise WorkbenchError(
-            f"{options.kind.name} needs total_timesteps: its schedules depend on them"
-        )
+        raise WorkbenchError(f"{options.kind.name} needs total_timesteps: its schedules depend on them")
     return SB3Training(options, make_learning_model(options, envs))
 
 

@@ -48,9 +48,7 @@ def fill(model: Any, folder: Path, run: RunOptions, say: Say) -> None:
     say(f"{len(episodes)} demonstrations, {steps} steps, begin the replay buffer: {folder}")
 
 
-def _add(
-    model: Any, before: Any, after: Any, action: Any, reward: float, ended: bool, cut_off: bool
-) -> None:
+def _add(model: Any, before: Any, after: Any, action: Any, reward: float, ended: bool, cut_off: bool) -> None:
     count, space = model.n_envs, model.action_space
     stored = model.policy.scale_action(action) if isinstance(space, spaces.Box) else action
     model.replay_buffer.add(

@@ -47,9 +47,7 @@ class SB3Options:
         """The arguments of the algorithm's class and of its network."""
         ours = {"policy", "policy_kwargs", "lr_schedule", "her", "n_sampled_goal",
                 "goal_selection_strategy", "demos"}  # fmt: skip
-        return {
-            each.name: getattr(self, each.name) for each in fields(self) if each.name not in ours
-        }
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ours}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,9 +113,7 @@ class OffPolicyOptions(SB3Options):
         "future", "her: the goal is achieved later in the episode, at its end, or anywhere in it",
         choices=("future", "final", "episode"),
     )  # fmt: skip
-    demos: str = option(
-        "", "a folder of demonstrations, which begin the replay buffer", metavar="FOLDER"
-    )
+    demos: str = option("", "a folder of demonstrations, which begin the replay buffer", metavar="FOLDER")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,12 +152,8 @@ class DQNOptions(OffPolicyOptions):
     batch_size: int = option(32, "steps of a minibatch", 1, inf)
     tau: float = option(1.0, "share of the new weights in a target network's update", 0, 1)
     train_freq: Any = option(4, "steps between two updates, or as in [1, episode]")
-    target_update_interval: int = option(
-        10_000, "steps between two updates of the target network", 1, inf
-    )
-    exploration_fraction: float = option(
-        0.1, "share of total_timesteps until exploration_final_eps", 0, 1
-    )
+    target_update_interval: int = option(10_000, "steps between two updates of the target network", 1, inf)
+    exploration_fraction: float = option(0.1, "share of total_timesteps until exploration_final_eps", 0, 1)
     exploration_initial_eps: float = option(1.0, "probability of a random action at first", 0, 1)
     exploration_final_eps: float = option(0.05, "probability of a random action in the end", 0, 1)
     max_grad_norm: float = option(10.0, "clips the gradient's norm")

@@ -1,7 +1,7 @@
 """Stable-Baselines3's models, made from our options, and their policies, also as torch modules."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from itertools import repeat
 from typing import Any
 
 import gymnasium
@@ -54,12 +54,8 @@ class StoppableOnPolicy(OnPolicyAlgorithm):
 
     stride = 0  # steps of the last rollout, in all environments
 
-    def collect_rollouts(
-        self, env: Any, callback: Any, rollout_buffer: Any, n_rollout_steps: int
-    ) -> bool:
-        return callback.goes_on() and super().collect_rollouts(
-            env, callback, rollout_buffer, n_rollout_steps
-        )
+    def collect_rollouts(self, env: Any, callback: Any, rollout_buffer: Any, n_rollout_steps: int) -> bool:
+        return callback.goes_on() and super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
 
 class StoppableOffPolicy(OffPolicyAlgorithm):
@@ -67,23 +63,17 @@ class StoppableOffPolicy(OffPolicyAlgorithm):
 
     stride = 0  # steps of the last rollout, in all environments
 
-    def collect_rollouts(
-        self, env: Any, callback: Any, *arguments: Any, **named: Any
-    ) -> RolloutReturn:
+    def collect_rollouts(self, env: Any, callback: Any, *arguments: Any, **named: Any) -> RolloutReturn:
         if not callback.goes_on():
             return RolloutReturn(0, 0, continue_training=False)
         return super().collect_rollouts(env, callback, *arguments, **named)
-
-
-def _given(env: Env) -> Env:
-    return env
 
 
 class ParallelVecEnv(DummyVecEnv):
     """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
     def __init__(self, envs: Sequence[Env]) -> None:
-        super().__init__([partial(_given, env) for env in envs])
+        super().__init__([repeat(env).__next__ for env in envs])
         self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -123,14 +113,10 @@ def _check_fit(options: TrainingOptions, space: gymnasium.Space[Any]) -> None:
     others = [other for other, kinds in FITS.items() if isinstance(space, kinds)]
     others += ["dqn", "reinforce"] if isinstance(space, spaces.Discrete) else []
     hint = f"{', '.join(others)} fit it" if others else "none here fits it"
-    raise WorkbenchError(
-        f"{name} can't choose from {space}, the actions of {options.run.env_id}; {hint}"
-    )
+    raise WorkbenchError(f"{name} can't choose from {space}, the actions of {options.run.env_id}; {hint}")
 
 
-def _model_in(
-    vector: Any, options: TrainingOptions, arguments: dict[str, Any], made_class: Any
-) -> Any:
+def _model_in(vector: Any, options: TrainingOptions, arguments: dict[str, Any], made_class: Any) -> Any:
     run = options.run
     network = {name: arguments.pop(name) for name in ("net_arch", "log_std_init")}
     network = {name: value for name, value in network.items() if value is not None}
@@ -202,9 +188,7 @@ def _layers(value: Any) -> Any:
     try:
         return [int(each) for each in str(value).split(",")]
     except ValueError:
-        raise WorkbenchError(
-            f"net_arch must be whole numbers, as in 64,64, not {value!r}"
-        ) from None
+        raise WorkbenchError(f"net_arch must be whole numbers, as in 64,64, not {value!r}") from None
 
 
 def linear(start: float) -> Callable[[float], float]:

@@ -81,9 +81,7 @@ class LockstepWorld(RobotBackend):
 
     deterministic = complete = shared = True
 
-    def __init__(
-        self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT
-    ) -> None:
+    def __init__(self, scene: Scene, ticks: int, world: SharedWorld, timeout: float = TIMEOUT) -> None:
         self.scene, self._ticks, self._world = scene, ticks, world
         self._simulator = RunningSimulator()
         self._reset = SimulatorService(
@@ -98,9 +96,7 @@ class LockstepWorld(RobotBackend):
         loose = loose_joints(scene.robots[0].world, scene.objects)
         self._moved = [f"{model}::{name}" for model, name in (*moved, *loose)]
         self._at_rest = [(0.0, 0.0)] * len(loose)
-        self._full = {
-            name: full_name(robot, port.name) for name, (robot, port) in scene.ports.items()
-        }
+        self._full = {name: full_name(robot, port.name) for name, (robot, port) in scene.ports.items()}
         self._read = JointStateReader(scene)
         self._query = StateQuery()
         self._names = StepNames()  # of the query, without controllers
@@ -193,8 +189,7 @@ class LockstepWorld(RobotBackend):
 
     def _reading(self, found: SensorReading) -> Reading:
         values: dict[str, Any] = {
-            each.name: np.frombuffer(each.data, each.type).reshape(each.shape)
-            for each in found.values
+            each.name: np.frombuffer(each.data, each.type).reshape(each.shape) for each in found.values
         } or {"contacts": [from_contact_state(each) for each in found.contacts]}
         return Reading((found.now - self._begun) / 1e9, values)
 

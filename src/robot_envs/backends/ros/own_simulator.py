@@ -51,9 +51,7 @@ class OwnSimulator:
                      f"__log:={folder / 'node.log'}", "_pub_clock_frequency:=100"]  # fmt: skip
 
         try:
-            self._process = _start(
-                [*arguments, *filter(None, [world_path(world, folder)])], self.log
-            )
+            self._process = _start([*arguments, *filter(None, [world_path(world, folder)])], self.log)
         except OSError as error:
             raise RobotEnvError(f"{slot} can't be started: {error.strerror}") from error
         self._started = time.monotonic()

@@ -87,16 +87,12 @@ class RosVariation:
     def _call(self, name: str, kind: Any, *request: Any) -> Any:
         # A persistent connection makes a call several times as fast.
         if name not in self._clients:
-            self._clients[name] = SimulatorService(
-                name, kind, persistent=True, timeout=self._timeout
-            )
+            self._clients[name] = SimulatorService(name, kind, persistent=True, timeout=self._timeout)
         return self._clients[name](*request)
 
     def link(self, link: RobotPart) -> Inertia:
         name = _scoped(link)
-        answer: GetLinkPropertiesResponse = self._call(
-            "/gazebo/get_link_properties", GetLinkProperties, name
-        )
+        answer: GetLinkPropertiesResponse = self._call("/gazebo/get_link_properties", GetLinkProperties, name)
         check_success(answer, f"link {name} can't be read")
         if not answer.gravity_mode:
             self._weightless.add(name)
@@ -122,9 +118,7 @@ class RosVariation:
         # nothing.
         viscous, fmax = ([] if each is None else [each] for each in (damping, friction))
         wanted = ODEJointProperties(damping=viscous, fmax=fmax)
-        answer = self._call(
-            "/gazebo/set_joint_properties", SetJointProperties, _scoped(joint), wanted
-        )
+        answer = self._call("/gazebo/set_joint_properties", SetJointProperties, _scoped(joint), wanted)
         check_success(answer, f"joint {joint.name} can't be changed")
 
     def set_surface(self, link: RobotPart, factor: float) -> None:

@@ -170,17 +170,13 @@ class RealtimeWorld(RobotBackend):
         self._pause = SimulatorService("/gazebo/pause_physics", Empty)
         self._unpause = SimulatorService("/gazebo/unpause_physics", Empty)
         self._reset_world = SimulatorService("/gazebo/reset_world", Empty)
-        self._set_joints = SimulatorService(
-            "/gazebo/set_model_configuration", SetModelConfiguration
-        )
+        self._set_joints = SimulatorService("/gazebo/set_model_configuration", SetModelConfiguration)
         self._set_model = SimulatorService("/gazebo/set_model_state", SetModelState)
         self._get_link = SimulatorService("/gazebo/get_link_state", GetLinkState)
         self._held: dict[str, Any] = {}
         self._is_paused = False
         self._begin = 0.0  # [s] of the episode
-        self._topics = {
-            name: CommandTopic(scene, robot, port) for name, (robot, port) in scene.ports.items()
-        }
+        self._topics = {name: CommandTopic(scene, robot, port) for name, (robot, port) in scene.ports.items()}
         world.join(self)
         self._states = JointStates(scene)
         self._sensors = SensorListener(scene.robots[0], (), time.monotonic)
@@ -221,8 +217,7 @@ class RealtimeWorld(RobotBackend):
         if not came:
             missing = ", ".join(self._sensors.missing())
             raise SimulatorError(
-                self._sensors.fault()
-                or f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset"
+                self._sensors.fault() or f"no message on {missing} for {STATE_TIMEOUT:g} s since the reset"
             )
 
     def _place_model(self, name: str, motion: Motion) -> None:
@@ -263,9 +258,7 @@ class RealtimeWorld(RobotBackend):
 
     def look(self, query: StateQuery) -> None:
         if replace(query, sensors=()) != StateQuery():
-            raise RobotEnvError(
-                f"{_ONLY_JOINTS}: it has no links, models and contacts{ONLY_REWARDED}"
-            )
+            raise RobotEnvError(f"{_ONLY_JOINTS}: it has no links, models and contacts{ONLY_REWARDED}")
         self._sensors.close()
         self._sensors = SensorListener(self.scene.robots[0], query.sensors, time.monotonic)
 

@@ -313,7 +313,5 @@ class JointStateReader:
             else:
                 missing.append(key)
         if missing:
-            raise SimulatorFault(
-                f"the joint state lacks {' and '.join(missing)}; it has: {list(names)}"
-            )
+            raise SimulatorFault(f"the joint state lacks {' and '.join(missing)}; it has: {list(names)}")
         return places

@@ -116,9 +116,7 @@ class SensorListener:
         """Returns the topics that nothing has come on."""
         with self._arrived:
             return [
-                str(each.resolved_name)
-                for name, each in self._subscribers.items()
-                if name not in self._heard
+                str(each.resolved_name) for name, each in self._subscribers.items() if name not in self._heard
             ]
 
     def fault(self) -> str:
@@ -129,9 +127,7 @@ class SensorListener:
     def wait(self, timeout: float) -> bool:
         """Returns whether something has come of all, at the latest after so long [s of wall time]."""
         with self._arrived:
-            return self._arrived.wait_for(
-                lambda: len(self._heard) == len(self._subscribers), timeout
-            )
+            return self._arrived.wait_for(lambda: len(self._heard) == len(self._subscribers), timeout)
 
     def trouble(self, late: float) -> str:
         """Returns which sensor is unreadable, or silent for `late` [s] and three periods since `resume`."""
@@ -175,8 +171,7 @@ def _source(robot: Robot, name: str) -> tuple[str, TopicSource, float]:
         return topic, TopicSource(Odometry, read=_motion), 0.0
     libraries, kinds = sources()
     known = {
-        each.name: (each.kind, next(iter(each.plugins), None), each.rate)
-        for each in robot.links.sensors
+        each.name: (each.kind, next(iter(each.plugins), None), each.rate) for each in robot.links.sensors
     }
     for plugin in robot.links.plugins:
         if library_of(plugin.filename) in libraries:

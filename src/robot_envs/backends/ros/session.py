@@ -145,9 +145,7 @@ class RosSession:
             self._undo.callback(windows.open_window(say))
             windows.report_opening(say, registered=True)
 
-    def connect(
-        self, scene: Scene, control_period: float, deadline: float | None = None
-    ) -> RobotBackend:
+    def connect(self, scene: Scene, control_period: float, deadline: float | None = None) -> RobotBackend:
         """Makes a backend that moves the robots; the caller closes it. See `make_backend`."""
         ticks = ticks_per_action(control_period, running.physics_step()) if control_period else 0
         if self._realtime:

@@ -18,9 +18,7 @@ __all__ = ["Controller", "Input", "Output", "built_in", "find_type"]
 @cache
 def built_in() -> dict[str, type[Controller]]:
     """Returns the controllers of this folder's modules, by type name."""
-    modules = [
-        importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)
-    ]
+    modules = [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
     return {
         name: type(made.__name__, (made,), {"type_name": name, "interface": interface})
         for module in modules
@@ -46,9 +44,7 @@ def find_type(type_name: str) -> type[Controller] | None:
         return None
     where = f"{package} (of {spec.origin})"
     if controller is None:
-        raise ControlError(
-            f"controller type '{type_name}' does not exist: {where} has no class {name}"
-        )
+        raise ControlError(f"controller type '{type_name}' does not exist: {where} has no class {name}")
     if not isinstance(controller, type) or not issubclass(controller, Controller):
         raise ControlError(
             f"controller type '{type_name}': {name} of {where} is not a subclass of "

@@ -89,9 +89,7 @@ class Controller(Stateful, ABC):
 
     @classmethod
     @abstractmethod
-    def create(
-        cls, name: str, params: Mapping[str, object], hardware: RobotHardware
-    ) -> "Controller":
+    def create(cls, name: str, params: Mapping[str, object], hardware: RobotHardware) -> "Controller":
         """Creates the controller from its parameters `<ns>/<name>`.
 
         Raises ControlError if a parameter or a joint is missing or wrong.

@@ -66,9 +66,7 @@ class DiffDriveController(VehicleController):
         self._left, self._right = sides
         self._measures = (sides[0].radius, sides[1].radius, separation)  # before multipliers
         self._rescale(scales)
-        self.tunables = {
-            key: (scale, min(scale, 0.5), max(scale, 1.5)) for key, scale in scales.items()
-        }
+        self.tunables = {key: (scale, min(scale, 0.5), max(scale, 1.5)) for key, scale in scales.items()}
         self.tunables["publish_rate"] = (options.publish_rate, 0.0, 2000.0)
         self.tunables["enable_odom_tf"] = (options.enable_odom_tf, False, True)
         self._joints = sides[0].joints + sides[1].joints

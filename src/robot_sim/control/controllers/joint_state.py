@@ -40,9 +40,7 @@ class JointStateController(Controller):
 
     parameters = (JointStateParameters,)
 
-    def __init__(
-        self, name: str, joints: list[JointHandle], rate: float, extra: list[Extra]
-    ) -> None:
+    def __init__(self, name: str, joints: list[JointHandle], rate: float, extra: list[Extra]) -> None:
         super().__init__(name)
         self._joints = joints
         self._period = round(NANOSECONDS / rate) if rate > SLOWEST else None

@@ -58,9 +58,7 @@ class JointTolerances(Parameters):
     trajectory: float = parameter(
         "largest error on the way [rad, m]; 0: any", 0.0, key="constraints/<joint>/trajectory"
     )
-    goal: float = parameter(
-        "largest error at a goal [rad, m]; 0: any", 0.0, key="constraints/<joint>/goal"
-    )
+    goal: float = parameter("largest error at a goal [rad, m]; 0: any", 0.0, key="constraints/<joint>/goal")
 
 
 class JointGains(Parameters):
@@ -220,9 +218,7 @@ class JointTrajectoryController(Controller):
 
     def _check_running(self, what: str) -> None:
         if self.state != "running":
-            raise TrajectoryRefused(
-                INVALID_GOAL, f"Controller '{self.name}' can't {what}: it is not running"
-            )
+            raise TrajectoryRefused(INVALID_GOAL, f"Controller '{self.name}' can't {what}: it is not running")
 
     def _lead(self, trajectory: Trajectory) -> tuple[int, str]:
         """Starts a trajectory; returns the uptime at which it begins [ns], and a warning."""
@@ -235,10 +231,7 @@ class JointTrajectoryController(Controller):
         dropped, warning = dropped_points(trajectory, tick - begins)
         start = max(tick, begins)
         for index, name in enumerate(trajectory.names):
-            way = [
-                (begins + point.time, point.waypoint(index))
-                for point in trajectory.points[dropped:]
-            ]
+            way = [(begins + point.time, point.waypoint(index)) for point in trajectory.points[dropped:]]
             self._axes[self.joint_names.index(name)].follow(tick, start, way)
         return start, warning
 

@@ -108,9 +108,7 @@ length = reader(lambda value: 0.0 < value < math.inf, "must be above 0 and finit
 positive = reader(lambda value: value > 0.0, "must be above 0 and finite", before=number)
 rate = reader(lambda value: value > SLOWEST, "must be more than 0 [Hz]", before=number)
 name_list = reader(are_names, "must be a list of joint names", list)
-joint_name = reader(
-    lambda value: isinstance(value, str) and value != "", "is missing or is not a string"
-)
+joint_name = reader(lambda value: isinstance(value, str) and value != "", "is missing or is not a string")
 joint_names = reader(
     lambda value: len(set(value)) == len(value), "names a joint twice", list,
     reader(lambda value: are_names(value) and value, "must be a list of joint names"),

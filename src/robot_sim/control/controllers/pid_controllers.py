@@ -109,9 +109,7 @@ class PidJoint(Controller):
         self._updates = count + 1
         return count % REPORT_EVERY == 0 and self._state.wanted
 
-    def _report(
-        self, now: int, dt: float, set_point: float, value: float, rate: float, error: float
-    ) -> None:
+    def _report(self, now: int, dt: float, set_point: float, value: float, rate: float, error: float) -> None:
         """Reports process `value` and its `rate`; `now` [ns], `dt` [s]."""
         gains = self._pid.gains
         self._state.send(

@@ -37,9 +37,7 @@ class SensorController(Controller):
         super().__init__(name)
         self._rate = rate
         self._period = Period(rate, 0, late=True)
-        self._handles = [
-            (each, Output(each.name, self.kind, shared=True, whole=True)) for each in handles
-        ]
+        self._handles = [(each, Output(each.name, self.kind, shared=True, whole=True)) for each in handles]
         self.outputs = [output for _, output in self._handles]
 
     @classmethod

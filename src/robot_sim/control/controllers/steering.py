@@ -98,9 +98,7 @@ class AckermannSteeringController(SteeringController):
         given, robot = AckermannParameters.read(params, name), hardware.robot
         wheel = hardware.joint(VELOCITY, given.rear_wheel)
         fork = hardware.joint(POSITION, given.front_steer)
-        base = given.length(
-            "wheel_separation_h", name, lambda: distance(robot, wheel.name, fork.name)
-        )
+        base = given.length("wheel_separation_h", name, lambda: distance(robot, wheel.name, fork.name))
         radius = given.length("wheel_radius", name, lambda: wheel_radius(robot, wheel.name))
         base *= given.wheel_separation_h_multiplier
         controller = cls(name, given, wheel, fork, base, radius)
@@ -150,8 +148,7 @@ class FourWheelSteeringController(SteeringController):
         groups = given.front_wheel, given.rear_wheel, given.front_steering, given.rear_steering
         kinds = VELOCITY, VELOCITY, POSITION, POSITION
         joints = [
-            [hardware.joint(kind, each) for each in names]
-            for kind, names in zip(kinds, groups, strict=True)
+            [hardware.joint(kind, each) for each in names] for kind, names in zip(kinds, groups, strict=True)
         ]
         (left, right), (rear, _), forks = groups[:3]
         between = distance(robot, left, right)

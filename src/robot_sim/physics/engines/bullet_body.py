@@ -97,9 +97,7 @@ class BulletBody(Body):
         """Finds PyBullet's indices of joints and links."""
         description = self._description
         count = pybullet.getNumJoints(self.id, physicsClientId=self._client)
-        joints = {
-            pybullet.getJointInfo(self.id, i, self._client)[1].decode(): i for i in range(count)
-        }
+        joints = {pybullet.getJointInfo(self.id, i, self._client)[1].decode(): i for i in range(count)}
         self.joint_names = tuple(
             name for name, joint in description.joints.items() if joint.movable and name in joints
         )
@@ -108,9 +106,7 @@ class BulletBody(Body):
             joint.child: joints[name] for name, joint in description.joints.items()
         }
         self.link_names = tuple(
-            name
-            for name, link in description.links.items()
-            if name in self._links and not link.part_of
+            name for name, link in description.links.items() if name in self._links and not link.part_of
         )
 
     def forget_contacts(self) -> None:
@@ -171,9 +167,7 @@ class BulletBody(Body):
 
     def pieces(self, link: str) -> list[int]:
         """Returns PyBullet's links that stand for a link, its own first."""
-        own = [
-            i for name, i in self._links.items() if self._description.links[name].part_of == link
-        ]
+        own = [i for name, i in self._links.items() if self._description.links[name].part_of == link]
         return [self._links[link], *own]
 
     def _check_meshes(self) -> None:
@@ -196,9 +190,7 @@ class BulletBody(Body):
             return
         meet = self._description.pairs_that_collide()
         solid = [link for link in self._description.links.values() if link.collisions]
-        self.overlapping = frozenset(
-            frozenset((a.owner, b.owner)) for a, b in meet if self._overlap(a, b)
-        )
+        self.overlapping = frozenset(frozenset((a.owner, b.owner)) for a, b in meet if self._overlap(a, b))
         names = {(a.name, b.name) for a, b in meet if {a.owner, b.owner} not in self.overlapping}
         for a, b in combinations((link.name for link in solid if link.name in self._links), 2):
             pybullet.setCollisionFilterPair(
@@ -274,9 +266,7 @@ class BulletBody(Body):
         """Limits speeds for a step of `dt` [s]. PyBullet has one limit for joints and base."""
         self._motors.clear()  # PyBullet keeps the impulse of a step
         fastest = FURTHEST / dt if self._indices else FASTEST
-        pybullet.changeDynamics(
-            self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client
-        )
+        pybullet.changeDynamics(self.id, BASE, maxJointVelocity=fastest, physicsClientId=self._client)
         for name, (_, effort) in self._gears.items():
             self.set_gear(name, effort)
 

@@ -91,9 +91,7 @@ class BulletEngine(Engine):
             | pybullet.URDF_USE_IMPLICIT_CYLINDER  # with 32 sides a wheel would rock
         )
         if description.collides_with_itself:
-            flags |= (
-                pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
-            )
+            flags |= pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT
         body = self._load_files(engine_form, pose, flags)
         try:
             return self._made(body, engine_form, pose, offsets)
@@ -212,9 +210,7 @@ class BulletEngine(Engine):
         self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
         return number
 
-    def _fix(
-        self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]
-    ) -> None:
+    def _fix(self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]) -> None:
         constraint = add_weld(self._client, made_of)
         self._fastened[number] = Fastening(constraint, made_of, apart)
         self._let_meet(number, False)

@@ -108,9 +108,7 @@ def _write_inertia(link: Element, inertia: Inertia) -> None:
     inertial = SubElement(link, "inertial")
     _write_origin(inertial, inertia.com)
     SubElement(inertial, "mass", value=repr(inertia.mass))
-    tensor = {
-        key: repr(getattr(inertia, key)) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    }
+    tensor = {key: repr(getattr(inertia, key)) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")}
     SubElement(inertial, "inertia", tensor)
 
 

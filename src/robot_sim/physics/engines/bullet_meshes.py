@@ -31,9 +31,7 @@ class SharedMeshes:
         self._client = client
         self._meshes: dict[Key, tuple[int, int]] = {}  # PyBullet's number, and the file's [bytes]
         self._users: dict[int, Key] = {}  # by body
-        self._drawn = pybullet.createVisualShape(
-            pybullet.GEOM_SPHERE, radius=UNSEEN, physicsClientId=client
-        )
+        self._drawn = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=UNSEEN, physicsClientId=client)
 
     @property
     def size(self) -> int:

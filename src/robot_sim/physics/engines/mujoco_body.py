@@ -58,9 +58,7 @@ class MujocoBody(Body):
         """`compile_anew` recompiles the world's model from its bodies' present settings."""
         self.description = description
         self.pose = pose  # of the root link; of one that is free, where it was loaded
-        self.link_names = tuple(
-            name for name, link in description.links.items() if not link.part_of
-        )
+        self.link_names = tuple(name for name, link in description.links.items() if not link.part_of)
         joints = [] if description.static else description.movable_joints
         self.joint_names = tuple(joint.name for joint in joints)
         self.inertias = description.inertias()
@@ -114,9 +112,7 @@ class MujocoBody(Body):
         q, v = self._places()
         wrenches = self._state.data.xfrc_applied[list(self._ids.values())]
         placed = self._state.placed
-        return MujocoMotion(
-            self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose, placed
-        )
+        return MujocoMotion(self._qpos[q], self._qvel[v], self._qfrc[v], wrenches, self.pose, placed)
 
     def move(self, motion: MujocoMotion) -> None:
         if self._free is None and motion.pose != self.pose:

@@ -45,9 +45,7 @@ class MujocoEngine(Engine):
     def load(self, description: ModelDescription, pose: Pose) -> MujocoBody:
         return self._load([(description, pose)])[0]
 
-    def load_all(
-        self, models: Sequence[tuple[ModelDescription, Pose]]
-    ) -> Iterator[Body | DescriptionError]:
+    def load_all(self, models: Sequence[tuple[ModelDescription, Pose]]) -> Iterator[Body | DescriptionError]:
         """Compiles the world once for all of them."""
         try:
             yield from self._load(models)
@@ -173,9 +171,7 @@ class MujocoEngine(Engine):
         option.enableflags |= mujoco.mjtEnableBit.mjENBL_DIAGEXACT
         # Without warm starts the future depends on the state alone, not on the history. MuJoCo must not
         # reset the world by itself.
-        option.disableflags |= (
-            mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        )
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         for reference in (
             model.jnt_solref, model.dof_solref, model.geom_solref, model.tendon_solref_fri,
             model.eq_solref,

@@ -187,9 +187,7 @@ class ModelWriter:
                 self.spec.add_exclude(bodyname1=f"{self.key}:{a}", bodyname2=f"{self.key}:{b}")
 
 
-def add_weld(
-    spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose, pin: Vector | None = None
-) -> None:
+def add_weld(spec: mujoco.MjSpec, names: tuple[str, str], pose: Pose, pin: Vector | None = None) -> None:
     """Fixes a body to another one, at `pose` in the frame of the first one; or only its point `pin` there."""
     kind = mujoco.mjtEq.mjEQ_WELD if pin is None else mujoco.mjtEq.mjEQ_CONNECT
     numbers = pin or (*ZERO, *pose.position, *wxyz(pose.orientation), 1.0)

@@ -182,17 +182,13 @@ class MujocoState:
         ax, ay, az, vx, vy, vz = speed.tolist()
         return Pose((x, y, z), xyzw(data.xquat[index])), ((vx, vy, vz), (ax, ay, az))
 
-    def overlapping(
-        self, touching: Mapping[int, tuple[str, tuple[str, ...]]]
-    ) -> frozenset[frozenset[str]]:
+    def overlapping(self, touching: Mapping[int, tuple[str, tuple[str, ...]]]) -> frozenset[frozenset[str]]:
         """Returns pairs of links that overlap with all joints at zero, of a model with these geoms."""
         data = mujoco.MjData(self.model)
         mujoco.mj_fwdPosition(self.model, data)
         pairs = [contact.geom.tolist() for contact in data.contact if contact.dist < -OVERLAP]
         return frozenset(
-            frozenset((touching[a][0], touching[b][0]))
-            for a, b in pairs
-            if a in touching and b in touching
+            frozenset((touching[a][0], touching[b][0])) for a, b in pairs if a in touching and b in touching
         )
 
     def contacts(self, sides: Mapping[int, Side]) -> list[Contact]:

@@ -96,15 +96,11 @@ class WithoutEffect:
                         self._judge(what, row, value, outer, outside)
             for child in outer:
                 row = rows.get(child.tag, rows.get("*"))
-                if _is_foreign(child.tag) or self._judge(
-                    f"<{child.tag}>", row, given(child), outer, outside
-                ):
+                if _is_foreign(child.tag) or self._judge(f"<{child.tag}>", row, given(child), outer, outside):
                     continue
                 if row is not None and row.answer in ("", READ) and row.section != MODEL:
                     own = child.get("name", child.get("reference", ""))
-                    inner = (
-                        f"{child.tag} '{shown(own)}'" if own else child.tag if row.section else ""
-                    )
+                    inner = f"{child.tag} '{shown(own)}'" if own else child.tag if row.section else ""
                     below = table[row.section].top.below if row.section else row.below
                     todo.append((child, below, ", ".join(filter(None, (outside, inner)))))
 

@@ -159,9 +159,7 @@ def _not_found(name: str, known: Iterable[str]) -> DescriptionError:
     others = sorted({each for each in known if each})
     names = ", ".join(f"'{shown(each)}'" for each in others[:MOST_NAMES])
     more = " and others" if len(others) > MOST_NAMES else ""
-    return DescriptionError(
-        f"it has no submesh '{shown(name)}', but {names or 'none with a name'}{more}"
-    )
+    return DescriptionError(f"it has no submesh '{shown(name)}', but {names or 'none with a name'}{more}")
 
 
 def _read_stl(data: bytes, only: str) -> list[Part]:
@@ -214,9 +212,7 @@ def _read_obj(data: bytes, only: str) -> list[Part]:
         elif kind == "f":
             corners = _obj_corners(words[1:], len(vertices), number)
             fan = pairwise(corners[1:])
-            parts[-1][1].extend(
-                [[corners[0], b, c] for b, c in fan] if len(corners) > 3 else [corners]
-            )
+            parts[-1][1].extend([[corners[0], b, c] for b, c in fan] if len(corners) > 3 else [corners])
             if max(corners) > highest:
                 highest, place = max(corners), number
         elif kind in ("o", "g") and words != header:

@@ -25,13 +25,9 @@ MeshFile = tuple[str, Mesh | None]
 
 # Limits on the text and all that it includes, counted each time it is included.
 MAX_FILES = 1000  # different ones
-MAX_MESH_BYTES = (
-    400_000_000  # of a model's different mesh files, which take about twice that of memory
-)
+MAX_MESH_BYTES = 400_000_000  # of a model's different mesh files, which take about twice that of memory
 MAX_MODELS = 5000  # in a world, or nested in a model
-MAX_SPLITTING = (
-    120.0  # [s] of wall time for a model's convex pieces; the other meshes keep their hulls
-)
+MAX_SPLITTING = 120.0  # [s] of wall time for a model's convex pieces; the other meshes keep their hulls
 MAX_SECONDS = 60.0  # [s] of computing for a model, however busy the machine is otherwise
 TELLING = 5.0  # [s] between two lines on the progress
 
@@ -182,9 +178,7 @@ class Reading:
                             raise DescriptionError(f"others took {MAX_SPLITTING:g} s")
                         split[shape.solid] = in_pieces(shape.solid)
                     except DescriptionError as error:
-                        model.warnings.append(
-                            f"mesh '{shape.mesh}' collides by its convex hull: {error}"
-                        )
+                        model.warnings.append(f"mesh '{shape.mesh}' collides by its convex hull: {error}")
                 link.collisions[number] = replace(shape, solid=split[shape.solid])
 
     def model(self) -> None:

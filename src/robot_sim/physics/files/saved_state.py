@@ -76,9 +76,7 @@ def _pose(element: Element, where: str, default: Pose) -> Pose:
     return pose
 
 
-def _links(
-    model: Element, scope: str, where: str, rest: dict[str, Pose]
-) -> Iterator[tuple[str, Saved]]:
+def _links(model: Element, scope: str, where: str, rest: dict[str, Pose]) -> Iterator[tuple[str, Saved]]:
     """Yields the links of a model's state and of those nested in it; in `rest` their names end in ::."""
     for element in model:
         name = scope + element.get("name", "")

@@ -163,9 +163,7 @@ class _Parts:
     stand_ins: list[str] = field(default_factory=list)
 
 
-def parse_sdf(
-    text: str | bytes, source: str = "SDF", resources: Resources | None = None
-) -> ModelDescription:
+def parse_sdf(text: str | bytes, source: str = "SDF", resources: Resources | None = None) -> ModelDescription:
     """Returns the first model of an SDF text, in the file's pose if it gives one (`initial_pose`).
 
     Raises:
@@ -187,9 +185,7 @@ def sdf_version(root: Element) -> tuple[int, int]:
         raise DescriptionError(f"the root element is <{shown(root.tag)}>, not <sdf>")
     version = _version(root.get("version", "1.4"))
     if version is None or version[0] != 1:
-        raise DescriptionError(
-            f"<sdf version>: '{shown(root.get('version', ''))}' isn't a version 1.x"
-        )
+        raise DescriptionError(f"<sdf version>: '{shown(root.get('version', ''))}' isn't a version 1.x")
     return version
 
 
@@ -316,14 +312,11 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
         joint.parent = joint.parent if joint.parent == WORLD else f"{prefix}::{joint.parent}"
         # The nested model was read in its own frame, so its joints to the world would be misplaced.
         if joint.parent == WORLD:
-            raise DescriptionError(
-                f"joint '{joint.name}': a nested model can't be joined to the world"
-            )
+            raise DescriptionError(f"joint '{joint.name}': a nested model can't be joined to the world")
     parts.links += inner.links
     parts.joints += inner.joints
     parts.plugins += [
-        replace(each, scope=f"{prefix}::{each.scope}" if each.scope else prefix)
-        for each in inner.plugins
+        replace(each, scope=f"{prefix}::{each.scope}" if each.scope else prefix) for each in inner.plugins
     ]
     parts.sensors += [
         replace(
@@ -356,14 +349,10 @@ def add_frames(parent: Element, frames: Frames) -> None:
         frames.add(name, pose, relative_to or element.get("attached_to", ""))
 
 
-def _read_link(
-    element: Element, context: FileContext, frames: Frames, parts: _Parts, static: bool
-) -> Link:
+def _read_link(element: Element, context: FileContext, frames: Frames, parts: _Parts, static: bool) -> Link:
     name = named(element, "link")
     where = f"link '{name}'"
-    meshes = MeshFinder(
-        context.resources, context.reading, context.folder, parts.warnings, parts.stand_ins
-    )
+    meshes = MeshFinder(context.resources, context.reading, context.folder, parts.warnings, parts.stand_ins)
     shapes = ShapeReader(meshes, frames)
     link = Link(name, read_inertia(element, where, static))
     link.collisions = list(shapes.read(element, "collision", where))

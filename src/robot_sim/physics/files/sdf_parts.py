@@ -165,9 +165,7 @@ class JointReader:
         kind = element.get("type", "")
         if kind not in KINDS:
             raise DescriptionError(f"{where}: type '{shown(kind)}' is none of {', '.join(KINDS)}")
-        joint = Joint(
-            name, kind, joint_end(element, "parent"), joint_end(element, "child"), kept=True
-        )
+        joint = Joint(name, kind, joint_end(element, "parent"), joint_end(element, "child"), kept=True)
         if joint.child == WORLD:
             raise DescriptionError(f"{where}: the world can be a joint's parent, not its child")
         self._set_frames(joint, element, where)

@@ -140,9 +140,7 @@ class ShapeReader:
         return replace(
             shape,
             mu=_not_negative(element, "surface/friction/ode/mu", where, "friction", shape.mu),
-            max_vel=_not_negative(
-                element, "surface/contact/ode/max_vel", where, "max_vel", shape.max_vel
-            ),
+            max_vel=_not_negative(element, "surface/contact/ode/max_vel", where, "max_vel", shape.max_vel),
             retro=retro,
         )
 

@@ -166,9 +166,7 @@ class LinkReader:
             link.inertia = body = self._or_none(_inertia, inertial, f"{place}, inertial")
             # Gazebo's engine crashes over it.
             if body is not None and min(body.mass, body.ixx, body.iyy, body.izz) < -TINY:
-                raise DescriptionError(
-                    f"{place}, inertial: mass and moments of inertia can't be negative"
-                )
+                raise DescriptionError(f"{place}, inertial: mass and moments of inertia can't be negative")
         link.collisions = list(self._shapes(element, "collision", place))
         link.visuals = list(self._shapes(element, "visual", place))
         return link

@@ -46,9 +46,7 @@ def apply_extensions(model: ModelDescription, robot: Element) -> None:
         elif reference in model.joints:
             _apply_to_joint(model, model.joints[reference], block)
         else:
-            model.warnings.append(
-                f"<gazebo reference='{shown(reference)}'> refers to no link or joint"
-            )
+            model.warnings.append(f"<gazebo reference='{shown(reference)}'> refers to no link or joint")
 
 
 def _apply_to_model(model: ModelDescription, block: Element) -> None:
@@ -115,9 +113,7 @@ def add_extension_joints(model: ModelDescription, robot: Element) -> None:
     for read in _read(elements, poses, model.warnings):
         joint = _on_whole_links(read, model)
         if joint.name in joints:
-            model.warnings.append(
-                f"joint '{joint.name}' is there twice; that in <gazebo> is left out"
-            )
+            model.warnings.append(f"joint '{joint.name}' is there twice; that in <gazebo> is left out")
             continue
         joints[joint.name] = joint
         if WORLD not in links and joint.parent == WORLD:

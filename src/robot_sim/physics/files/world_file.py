@@ -75,9 +75,7 @@ def empty_world() -> WorldDescription:
     return WorldDescription(models={"ground_plane": ground_plane()}, lights={"sun": sun})
 
 
-def load_world(
-    path: Path, resources: Resources, reading: Reading | None = None
-) -> WorldDescription:
+def load_world(path: Path, resources: Resources, reading: Reading | None = None) -> WorldDescription:
     """Reads a world file. A model that can't be read is left out, with a warning.
 
     Raises:
@@ -256,9 +254,7 @@ def _place(world: WorldDescription, element: Element, frames: Frames) -> None:
 def _read_physics(world: WorldDescription, element: Element) -> None:
     """Reads gravity and the physics profile: the default one, if there are several."""
     profiles = element.findall("physics")
-    profile = next(
-        (p for p in profiles if truth(p.get("default"))), profiles[0] if profiles else None
-    )
+    profile = next((p for p in profiles if truth(p.get("default"))), profiles[0] if profiles else None)
     gravity = element.findtext("gravity")
     if gravity is None and profile is not None:
         gravity = profile.findtext("gravity")  # SDF 1.4
@@ -303,9 +299,7 @@ class UnknownFormat(DescriptionError):
     """The text is neither SDF nor URDF."""
 
 
-def read_entity(
-    text: str, name: str, resources: Resources, reading: Reading
-) -> ModelDescription | Light:
+def read_entity(text: str, name: str, resources: Resources, reading: Reading) -> ModelDescription | Light:
     """Returns the first model or light of `text`, under the given name.
 
     Raises:

@@ -78,9 +78,7 @@ class At(TypedDict, total=False):
     gazebo_ns: str
 
 
-def call(
-    service: str, kind: Any, *request: Any, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> Any:
+def call(service: str, kind: Any, *request: Any, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> Any:
     """Returns the simulator's answer, or None after a failure, which is logged."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     try:
@@ -103,9 +101,7 @@ def succeeded(answer: Any) -> bool:
     return answer is not None and bool(answer.success)
 
 
-def empty_call(
-    service: str, retries: int, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def empty_call(service: str, retries: int, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
     """Calls a service without arguments until it succeeds, at most `retries` times."""
     name = f"{gazebo_ns.rstrip('/')}/{service}"
     for attempt in range(1, retries + 1):

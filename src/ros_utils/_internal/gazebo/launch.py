@@ -139,7 +139,5 @@ def _world(path: str | None, package: str | None, name: str | None) -> str | Non
     if package and name:
         return _packages.file(package, "worlds", name)
     if package or name:
-        raise _packages.NotFound(
-            "a world in a package needs both custom_world_pkg and custom_world_name"
-        )
+        raise _packages.NotFound("a world in a package needs both custom_world_pkg and custom_world_name")
     return None

@@ -56,9 +56,7 @@ def gazebo_unpause_physics(retries: int = 5, **at: Unpack[At]) -> bool:
     return empty_call("unpause_physics", retries, **at)
 
 
-def gazebo_step_physics(
-    steps: int = 1, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO
-) -> bool:
+def gazebo_step_physics(steps: int = 1, *, timeout: float = TIMEOUT, gazebo_ns: str = GAZEBO) -> bool:
     """Pauses the simulation and advances it by `steps` physics steps, as ``gz world -m`` does.
 
     Args:
@@ -87,9 +85,7 @@ def gazebo_step_physics(
 
 TIME_STEP = 0.001  # [s]
 GRAVITY = (0.0, 0.0, -9.81)  # [m/s²]
-ODE = ODEPhysics(
-    sor_pgs_iters=50, sor_pgs_w=1.3, contact_surface_layer=0.001, erp=0.2, max_contacts=20
-)
+ODE = ODEPhysics(sor_pgs_iters=50, sor_pgs_w=1.3, contact_surface_layer=0.001, erp=0.2, max_contacts=20)
 
 
 def gazebo_get_physics_properties(**at: Unpack[At]) -> Any:

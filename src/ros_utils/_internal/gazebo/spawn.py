@@ -131,9 +131,7 @@ def gazebo_spawn_urdf_pkg(
     """Spawns URDF or xacro ``<pkg_name><file_folder>/<file_name>``. See `gazebo_spawn_urdf_string`."""
     xml = urdf_parse_from_pkg(pkg_name, file_name, file_folder, args_xacro)
     if xml is None:
-        return SpawnResult(
-            False, f"{file_name} in package {pkg_name}: can't be found, read or expanded"
-        )
+        return SpawnResult(False, f"{file_name} in package {pkg_name}: can't be found, read or expanded")
     place = robot_namespace, reference_frame, (pos_x, pos_y, pos_z, ori_x, ori_y, ori_z, ori_w)
     return spawn("urdf", xml, model_name, *place, **how)
 

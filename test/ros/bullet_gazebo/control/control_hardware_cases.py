@@ -97,9 +97,7 @@ class HardwareTest(SlidesTest):
         topic = self.start_states()
         for _ in range(35):
             self.step(1)
-        self.assertTrue(
-            topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() >= 2_031_000_000)
-        )
+        self.assertTrue(topic.wait_for(lambda got: got and got[-1].header.stamp.to_nsec() >= 2_031_000_000))
         stamps = [message.header.stamp.to_nsec() // 1_000_000 for message in topic.messages]
         self.assertLessEqual(set(stamps), {2001, 2011, 2021, 2031})
 
@@ -112,9 +110,7 @@ class HardwareTest(SlidesTest):
     # controllers of users
 
     def load_rude(self, where):
-        rospy.set_param(
-            "/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where}
-        )
+        rospy.set_param("/slides/rude", {"type": "my_controllers/Rude", "joint": "effort_b", "where": where})
         return self.manager.load("rude")
 
     def test_a_controller_that_is_made_wrongly_is_refused_and_leaves_nothing(self):

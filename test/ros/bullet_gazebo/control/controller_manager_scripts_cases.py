@@ -105,9 +105,7 @@ class ScriptsTest(PausedRobot):
                 code, _, errors = self.run_here(command)
             waiting, gone = errors.splitlines()
             self.assertEqual((code, waiting), (1, f"waiting up to 0.5 s for the service {name}"))
-            self.assertIn(
-                f"there is no controller manager: no node offers the service {name}", gone
-            )
+            self.assertIn(f"there is no controller manager: no node offers the service {name}", gone)
 
     def test_without_a_master_they_say_so(self):
         with socket.socket() as reserved:  # bound, and nobody listens
@@ -165,9 +163,7 @@ class ScriptsTest(PausedRobot):
     def test_an_unknown_group(self):
         code, output, errors = self.run_here("controller_group switch nobody")
         self.assertEqual((code, output), (1, ""))
-        self.assertIn(
-            "no group 'nobody' in /controller_groups: ['empty', 'lower', 'other', 'upper']", errors
-        )
+        self.assertIn("no group 'nobody' in /controller_groups: ['empty', 'lower', 'other', 'upper']", errors)
 
     # the Python module
 
@@ -189,9 +185,7 @@ class ScriptsTest(PausedRobot):
             ]
             interface.list_controllers()
             interface.list_controller_types()
-        self.assertEqual(
-            returned, [False, True, True, True, True, True, False, False, True, True, True]
-        )
+        self.assertEqual(returned, [False, True, True, True, True, True, False, False, True, True, True])
         expected = (
             "Error when loading 'nobody'\nLoaded 'cart'\nLoaded 'pole'\n"
             "Started ['cart'] successfully\nStopped ['cart'] successfully\n"

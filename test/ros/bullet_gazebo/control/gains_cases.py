@@ -56,9 +56,7 @@ class GainsTest(SlidesTest):
         self.assertTrue(gazebo("set_link_properties", light).success)
         log = self.hear("/rosout", Log)
         reconfigure(PID, p=400.0, d=800.0)
-        wanted = (
-            "controller 'effort_position' drives joint 'effort_a' of model 'slides' with d = 800"
-        )
+        wanted = "controller 'effort_position' drives joint 'effort_a' of model 'slides' with d = 800"
         self.assertTrue(log.wait_for(lambda got: any(wanted in each.msg for each in got)))
         [told] = [each for each in log.messages if wanted in each.msg]
         self.assertEqual(told.level, Log.WARN)

@@ -26,9 +26,7 @@ class SlidesTest(WorldCase):
 
     def step(self, ticks, **commands):
         """Lets time pass; returns {joint: (position, velocity, effort)}."""
-        states = step_world(
-            ticks, controllers=list(commands), commands=list(commands.values())
-        ).joint_states
+        states = step_world(ticks, controllers=list(commands), commands=list(commands.values())).joint_states
         found = zip(states.position, states.velocity, states.effort, strict=True)
         return dict(zip(states.name, found, strict=True))
 

@@ -57,9 +57,7 @@ class SpawnerTest(CartPoleCase):
         return str(path)
 
     def start(self, *command):
-        program = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
+        program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.programs.append(program)
         return program
 

@@ -22,9 +22,7 @@ def trajectory(joints, *points, stamp=0.0):
     message.header.stamp = rospy.Time.from_sec(stamp)
     for time, positions in points:
         rest = [0.0] * len(positions)
-        message.points.append(
-            JointTrajectoryPoint(positions, rest, rest, [], rospy.Duration.from_sec(time))
-        )
+        message.points.append(JointTrajectoryPoint(positions, rest, rest, [], rospy.Duration.from_sec(time)))
     return message
 
 
@@ -73,9 +71,7 @@ class Arm:
             f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction
         )
         self.command = rospy.Publisher(f"{name}/command", JointTrajectory, queue_size=1)
-        self._state = rospy.Subscriber(
-            f"{name}/state", JointTrajectoryControllerState, self.states.append
-        )
+        self._state = rospy.Subscriber(f"{name}/state", JointTrajectoryControllerState, self.states.append)
 
     def wait_connected(self):
         """Time may stand still, so nothing that waits for it will do."""

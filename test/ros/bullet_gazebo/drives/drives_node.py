@@ -24,8 +24,7 @@ DIFF = {
 }  # fmt: skip
 CONTROL = {"libgazebo_ros_control.so": {}}
 COVARIANCES = {
-    f"{what}_covariance_diagonal": [0.001, 0.001, 0.001, 0.001, 0.001, 0.03]
-    for what in ("pose", "twist")
+    f"{what}_covariance_diagonal": [0.001, 0.001, 0.001, 0.001, 0.001, 0.03] for what in ("pose", "twist")
 }
 
 
@@ -169,9 +168,7 @@ class Drives(WorldCase):
 
     def test_controllers_report_an_imu_and_a_joints_forces(self):
         imu = '<gazebo reference="base"><sensor name="imu" type="imu"/></gazebo>'
-        force = (
-            '<gazebo reference="left_joint"><sensor name="hub/ft" type="force_torque"/></gazebo>'
-        )
+        force = '<gazebo reference="left_joint"><sensor name="hub/ft" type="force_torque"/></gazebo>'
         for name in ("imu", "force_torque"):
             kind = "".join(part.title() for part in (*name.split("_"), "sensor", "controller"))
             params = {"type": f"{name}_sensor_controller/{kind}", "publish_rate": 50}

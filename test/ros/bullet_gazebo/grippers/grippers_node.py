@@ -35,9 +35,7 @@ class Gripping(GripperCase):
         handle = self.send(0.05)
         self.step(2.0)
         state, result = self.ended(handle)
-        self.assertEqual(
-            (state, result.stalled, result.reached_goal), (GoalStatus.ABORTED, True, False)
-        )
+        self.assertEqual((state, result.stalled, result.reached_goal), (GoalStatus.ABORTED, True, False))
         # MuJoCo's contacts still end the overlap of the first touch.
         self.assertAlmostEqual(result.position, 0.025, delta=0.004)
         self.assertLess(self.off(), CLOSE)
@@ -57,9 +55,7 @@ class Gripping(GripperCase):
         reached = self.send(0.02)
         self.step(1.0)
         state, result = self.ended(reached)
-        self.assertEqual(
-            (state, result.stalled, result.reached_goal), (GoalStatus.SUCCEEDED, False, True)
-        )
+        self.assertEqual((state, result.stalled, result.reached_goal), (GoalStatus.SUCCEEDED, False, True))
         self.assertAlmostEqual(result.position, 0.02, delta=CLOSE)
         preempted = self.send(0.0)
         self.client.cancel_goal()

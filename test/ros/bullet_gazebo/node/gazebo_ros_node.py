@@ -36,8 +36,7 @@ PACKAGE = """<package format="2"><name>my_arm</name><version>0.0.1</version>
 <description>An arm.</description><maintainer email="a@example.com">a</maintainer>
 <license>BSD</license></package>"""
 INERTIAL = (
-    '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>'
-    "</inertial>"
+    '<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>'
 )
 URDF = f"""<?xml version="1.0"?>
 <!-- a comment -->
@@ -204,9 +203,7 @@ class GazeboRos(unittest.TestCase):
         self.spawn("-urdf", "-file", path, "-model", "a", "-robot_namespace", "/a", *pose)
         turned = gazebo("get_model_state", "a", "arm").pose
         self.assertAlmostEqual(turned.orientation.z, 0.7071, places=2)
-        self.spawn(
-            "-urdf", "-stdin", "-model", "b", "-robot_namespace", "/b", "-wait", "a", text=URDF
-        )
+        self.spawn("-urdf", "-stdin", "-model", "b", "-robot_namespace", "/b", "-wait", "a", text=URDF)
         self.assertIn("b", model_names())
         self.assertIn("already exists", self.spawn("-urdf", "-file", path, "-model", "b", code=1))
         self.assertIn("not set", self.spawn("-urdf", "-param", "nix", "-model", "c", code=1))

@@ -28,9 +28,7 @@ class ThinningTest(unittest.TestCase):
         assert spawn_model("cartpole", rospy.get_param("/robot_description")).success
         assert Manager().start("joint_state_controller")
         cls.clock = Listener("/clock", Clock, False, lambda m: m.clock.to_nsec())
-        cls.joints = Listener(
-            "/joint_states", JointState, False, lambda m: m.header.stamp.to_nsec()
-        )
+        cls.joints = Listener("/joint_states", JointState, False, lambda m: m.header.stamp.to_nsec())
         cls.models = Listener("/gazebo/model_states", ModelStates, False, lambda m: len(m.name))
         # All three have found their publisher when it shows.
         assert ros_gazebo.gazebo_step_physics(1)
@@ -84,9 +82,7 @@ class ThinningTest(unittest.TestCase):
 
     def test_the_step_service_is_not_there(self):
         self.assertNotIn("/gazebo/step_world", rosservice.get_service_list())
-        with self.assertRaisesRegex(
-            ServiceGone, "/gazebo/prepare_step: the simulator isn't in lock-step"
-        ):
+        with self.assertRaisesRegex(ServiceGone, "/gazebo/prepare_step: the simulator isn't in lock-step"):
             StepClient().step(1)
 
 

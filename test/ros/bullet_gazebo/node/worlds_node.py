@@ -35,8 +35,7 @@ UNKNOWN = (
     "to Gazebo compatible format."
 )
 INERTIAL = (
-    "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia>"
-    "</inertial>"
+    "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
 )
 BOX = (
     f'<sdf version="1.6"><model name="x">{{more}}<link name="body">{INERTIAL}<collision name="shell">'
@@ -148,9 +147,7 @@ class Spawning(WorldCase):
         self.spawn("wordy", xml, kind="sdf", y=-30.0, z=1.0)
 
     def test_a_light_is_spawned_under_the_models_name(self):
-        xml = (
-            '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
-        )
+        xml = '<sdf version="1.6"><light name="l" type="point"><pose>0 0 1 0 0 0</pose></light></sdf>'
         self.assertTrue(spawn_sdf("torch", xml).success)
         self.assertEqual(spawn_sdf("torch", xml).status_message, EXISTS)
         self.assertNotIn("torch", model_names())
@@ -186,9 +183,7 @@ class Refusals(unittest.TestCase):
         self.refused("<!DOCTYPE>", "new", bomb)
         self.refused("nested more than 100 deep", "new", "<sdf>" * 100000)
         self.refused("has no mass", "new", f'<robot name="r"><link name="{"x" * 900}"/></robot>')
-        self.refused(
-            "longer than 1000 bytes", "new", f'<robot name="r"><link name="{"x" * 10**7}"/></robot>'
-        )
+        self.refused("longer than 1000 bytes", "new", f'<robot name="r"><link name="{"x" * 10**7}"/></robot>')
         links = "".join(f'<link name="l{i}"/>' for i in range(400_000))
         self.refused("links", "new", f'<robot name="r">{links}</robot>')
         with self.assertRaises(rospy.ServiceException):
@@ -254,9 +249,7 @@ class OddFiles(unittest.TestCase):
                    "-param", "/odd/robot_description", "-robot_namespace", "/odd"]  # fmt: skip
         self.assertEqual(subprocess.call(command), 0)
         rospy.wait_for_service("/odd/controller_manager/list_controllers", BOUND)
-        self.assertTrue(
-            ros_gazebo.gazebo_spawn_sdf_param("robot_description", "odd2", "/odd", pos_x=80)
-        )
+        self.assertTrue(ros_gazebo.gazebo_spawn_sdf_param("robot_description", "odd2", "/odd", pos_x=80))
         for name in ("odd", "odd2"):
             self.assertTrue(delete_model(name).success)
 

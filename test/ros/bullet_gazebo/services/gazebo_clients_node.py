@@ -70,9 +70,7 @@ class ClientsTest(WorldCase):
 
     def test_a_subscriber_that_is_killed_or_stopped_holds_nothing_up(self):
         for number in (signal.SIGKILL, signal.SIGSTOP):
-            with subprocess.Popen(
-                [sys.executable, "-c", LISTENER], stdout=subprocess.PIPE
-            ) as client:
+            with subprocess.Popen([sys.executable, "-c", LISTENER], stdout=subprocess.PIPE) as client:
                 self.assertEqual(client.stdout.readline(), b"listening\n")
                 client.send_signal(number)
                 self.check_alive()

@@ -36,9 +36,7 @@ class ForcesTest(GazeboTest):
         late = (rospy.Time(), rospy.Duration(1))
         self.fails("ApplyJointEffort: joint not found", "apply_joint_effort", "elbow", NAN, *late)
         for effort in (NAN, INF, 1e300):
-            self.refuses(
-                "ApplyJointEffort: effort is", "apply_joint_effort", "cart_pole", effort, *late
-            )
+            self.refuses("ApplyJointEffort: effort is", "apply_joint_effort", "cart_pole", effort, *late)
 
     def test_apply_body_wrench(self):
         forever, wrench = rospy.Duration(-1), Wrench(force=Vector3(0, 0, 2.0 * 9.8))
@@ -63,14 +61,10 @@ class ForcesTest(GazeboTest):
 
     def test_apply_body_wrench_failures(self):
         rest = (Point(), Wrench(force=Vector3(x=NAN)), rospy.Time(), rospy.Duration(-1))
-        self.fails(
-            "ApplyBodyWrench: body does not exist", "apply_body_wrench", "box", "nowhere", *rest
-        )
+        self.fails("ApplyBodyWrench: body does not exist", "apply_body_wrench", "box", "nowhere", *rest)
         self.fails("ApplyBodyWrench: reference_frame not found",
                    "apply_body_wrench", "body", "nowhere", *rest)  # fmt: skip
-        self.refuses(
-            "ApplyBodyWrench: wrench.force.x is nan", "apply_body_wrench", "body", "box", *rest
-        )
+        self.refuses("ApplyBodyWrench: wrench.force.x is nan", "apply_body_wrench", "body", "box", *rest)
 
     def without_gravity(self):
         gazebo("set_physics_properties", physics(gravity=Vector3()))

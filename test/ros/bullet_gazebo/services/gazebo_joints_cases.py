@@ -18,9 +18,7 @@ class JointsTest(GazeboTest):
         self.succeeds(text, "set_joint_properties", "cartpole::stand_cart", stops)
         gazebo("set_model_configuration", "cartpole", "", ["stand_cart"], [0.4])
         self.assertEqual(joint("stand_cart")[0], 0.1)
-        self.succeeds(
-            text, "set_joint_properties", "cart_pole", ODEJointProperties(damping=[100.0])
-        )
+        self.succeeds(text, "set_joint_properties", "cart_pole", ODEJointProperties(damping=[100.0]))
         gazebo("set_model_configuration", "cartpole", "", ["cart_pole"], [0.3])
         run(0.1)
         self.assertLess(abs(joint("cart_pole")[1]), 0.5)

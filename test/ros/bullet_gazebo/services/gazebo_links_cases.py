@@ -35,9 +35,7 @@ class LinksTest(GazeboTest):
         self.assertEqual((found.mass, found.gravity_mode, found.ixy), (4.0, False, 0.01))
         self.assertEqual(found.com, Pose(Point(0.1, 0, 0), Quaternion(0, 0, 0, 1)))
         wrench = Wrench(force=Vector3(8.0, 0, 0))
-        gazebo(
-            "apply_body_wrench", "box::body", "", Point(), wrench, rospy.Time(), rospy.Duration(-1)
-        )
+        gazebo("apply_body_wrench", "box::body", "", Point(), wrench, rospy.Time(), rospy.Duration(-1))
         time = run(0.2)
         found = self.box().twist.linear
         self.assertAlmostEqual(found.x, 8.0 / 4.0 * time, places=2)
@@ -54,9 +52,7 @@ class LinksTest(GazeboTest):
         self.assertIsInstance(before, GetLinkPropertiesResponse)
 
     def test_link_state(self):
-        answer = self.succeeds(
-            "GetLinkState: got state", "get_link_state", "pole", "cartpole::cart"
-        )
+        answer = self.succeeds("GetLinkState: got state", "get_link_state", "pole", "cartpole::cart")
         state = answer.link_state
         self.assertEqual((state.link_name, state.reference_frame), ("pole", "cartpole::cart"))
         self.assertAlmostEqual(state.pose.position.z, 0.03, places=6)

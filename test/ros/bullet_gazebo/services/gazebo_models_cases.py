@@ -11,9 +11,7 @@ from support.ros.calls import delete_model, gazebo, joint, model_names, sim_time
 
 class ModelsTest(GazeboTest):
     def test_model_properties(self):
-        found = self.succeeds(
-            "GetModelProperties: got properties", "get_model_properties", "cartpole"
-        )
+        found = self.succeeds("GetModelProperties: got properties", "get_model_properties", "cartpole")
         self.assertEqual(found.body_names, ["stand", "cart", "pole"])
         self.assertEqual(found.joint_names, ["grounding", "stand_cart", "cart_pole"])
         self.assertEqual((found.canonical_body_name, found.parent_model_name), ("", ""))

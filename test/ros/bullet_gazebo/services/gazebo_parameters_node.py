@@ -43,9 +43,7 @@ class ParametersTest(unittest.TestCase):
         RemoteWorld("/gazebo", rosgraph.get_master_uri()).command("reset")
         # Those that were on their way may come first.
         with self.news:
-            self.assertTrue(
-                self.news.wait_for(lambda: any(b < a for a, b in pairwise(self.stamps)), BOUND)
-            )
+            self.assertTrue(self.news.wait_for(lambda: any(b < a for a, b in pairwise(self.stamps)), BOUND))
             count = len(self.stamps)
         self.wait_for(count + 10)
 

@@ -81,9 +81,7 @@ class PhysicsTest(GazeboTest):
         self.assertEqual(len(answer.doubles + answer.ints + answer.bools), 15)
         found = gazebo("get_physics_properties")
         self.assertEqual((found.gravity.z, found.time_step), (-100.0, 0.001))
-        self.assertEqual(
-            (found.ode_config.max_contacts, found.ode_config.auto_disable_bodies), (7, True)
-        )
+        self.assertEqual((found.ode_config.max_contacts, found.ode_config.auto_disable_bodies), (7, True))
         self.assertEqual(rospy.get_param("/gazebo/gravity_z"), -100.0)
         update = rospy.wait_for_message("/gazebo/parameter_updates", Config, BOUND)
         self.assertEqual({p.name: p.value for p in update.doubles}["gravity_z"], -100.0)

@@ -23,9 +23,7 @@ class ShownRobotTest(WorldCase):
         self.assertTrue(found, f"no {what}, but {listener.messages[-1:]}")
 
     def test_a_robot_that_stands_anywhere_without_controllers(self):
-        self.addCleanup(
-            rospy.set_param, "/robot_description", rospy.get_param("/robot_description")
-        )
+        self.addCleanup(rospy.set_param, "/robot_description", rospy.get_param("/robot_description"))
         rospy.set_param("/robot_description", ROVER)
         command = ["rosrun", "cartpole", "shown_joints.py"]
         shown = subprocess.Popen(command)  # before there is a robot

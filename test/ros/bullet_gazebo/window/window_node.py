@@ -30,9 +30,7 @@ __all__ = ["DriveTest", "JointsTest", "ShownRobotTest", "WindowTest"]
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
   <material name="r"><color rgba="1 0 0 1"/></material></visual></link></robot>"""
-BROKEN = BALL.replace(
-    "</link>", '<visual><geometry><mesh filename="file://{}"/></geometry></visual></link>'
-)
+BROKEN = BALL.replace("</link>", '<visual><geometry><mesh filename="file://{}"/></geometry></visual></link>')
 DOOR = f"""<robot name="door"><link name="world"/><link name="frame">{INERTIAL}
 <visual><geometry><box size="0.1 0.1 0.8"/></geometry>
   <material name="b"><color rgba="0 0 1 1"/></material></visual></link>
@@ -243,9 +241,7 @@ class WindowTest(WindowCase):
         wanted = boxes(scene.picture(camera, width, height))
         self.assertGreater(wanted[3] - wanted[1], 60)  # the pole's height
         # As soon as the page has heard of the joints' positions
-        wait_for(
-            lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}"
-        )
+        wait_for(lambda: np.abs(boxes(self.screenshot()) - wanted).max() <= FEW, f"picture with {wanted}")
 
     def place_links(self, scene):
         """Places the robot in a renderer as the simulator has it."""

@@ -92,9 +92,7 @@ def test_the_weights_go_the_way_of_the_definitions(
     learner = DQNAgent(settings, 3, 4, seed=5)
     reference, steps = Reference(learner.q_net, options), episode_steps()
     for index, (observation, action, reward, following, how) in enumerate(steps):
-        learner.observe(
-            (observation, action, reward), following, how == "terminated", how == "truncated"
-        )
+        learner.observe((observation, action, reward), following, how == "terminated", how == "truncated")
         batch = transitions(steps[: index + 1], n_step, 0.5, bootstrap)
         assert len(learner.buffer) == len(batch)
         if batch:

@@ -114,9 +114,7 @@ def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
         agent.learn(an_episode(15, seed, actions=3))
     seen = np.array([o for seed in range(3) for o in an_episode(15, seed, actions=3).observations])
     mean, deviation = (seen / scale).mean(0), (seen / scale).std(0)
-    weight, bias = (
-        each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias)
-    )
+    weight, bias = (each.detach().double().numpy() for each in (agent.policy.fc.weight, agent.policy.fc.bias))
     batch = [an_episode(9 + seed, seed, terminated=seed != 4, actions=3) for seed in (3, 4, 5)]
     inputs, actions, advantages, targets, estimates = [], [], [], [], []
     for episode in batch:
@@ -127,8 +125,7 @@ def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
         values[-1] *= not episode.terminated
         for t in range(episode.length):
             advantage = sum(
-                (gamma * gae_lambda) ** (k - t)
-                * (episode.rewards[k] + gamma * values[k + 1] - values[k])
+                (gamma * gae_lambda) ** (k - t) * (episode.rewards[k] + gamma * values[k + 1] - values[k])
                 for k in range(t, episode.length)
             )
             advantages.append(advantage)
@@ -145,9 +142,7 @@ def test_a_batch_is_one_step_down_the_gradient_of_the_paper(normalize):
     for episode in batch:
         losses = agent.learn(episode)
     assert agent.policy.fc.weight.grad.numpy() == pytest.approx(slope, abs=1e-5)
-    assert losses.policy == pytest.approx(
-        -np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5
-    )
+    assert losses.policy == pytest.approx(-np.mean(np.log((chances * chosen).sum(1)) * advantages), abs=1e-5)
     assert losses.value == pytest.approx(np.mean((np.array(estimates) - targets) ** 2), rel=1e-4)
 
 

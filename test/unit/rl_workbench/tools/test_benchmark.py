@@ -74,9 +74,7 @@ def test_a_suite_gives_tables_with_every_seed_and_every_failure(
     assert cli.main(command) == 1  # a training has failed
     said, err = capsys.readouterr()
     assert "1 of 2 trainings failed; the first one: " in err
-    assert re.search(
-        r"of 2, 1 failed\] broken, seed 0: ended with exit code 1, .*can't make NoSuch-v0", said
-    )
+    assert re.search(r"of 2, 1 failed\] broken, seed 0: ended with exit code 1, .*can't make NoSuch-v0", said)
     rows = {row["variant"]: row for row in json.loads((out / "results.json").read_text())["runs"]}
     assert rows["plain"]["steps"] == 300 and rows["plain"]["best"] is not None
     assert rows["plain"]["cpu_seconds"] > 0

@@ -13,9 +13,7 @@ from rl_workbench.tools.by_hand import driven
 from rl_workbench.training import demonstrations
 from rl_workbench.training.demonstrations import Demonstration, Origin, Recorder, load, paths
 
-needs_browser = pytest.mark.skipif(
-    not find_browser(), reason="no Chromium: apt-get install chromium"
-)
+needs_browser = pytest.mark.skipif(not find_browser(), reason="no Chromium: apt-get install chromium")
 PAD = "navigator.getGamepads = () => [{{axes: [0, {}], buttons: []}}]; 1"
 
 
@@ -33,9 +31,7 @@ class Hand:
         given = argparse.Namespace(host="127.0.0.1", port=None, no_browser=True, out=Path("hand"))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("rl_workbench.tools.by_hand.tell", self._lines.append)
-            (self.episode,) = driven(
-                Recorder(env, self.origin), env, range(3, 4), Interrupt(), given
-            )
+            (self.episode,) = driven(Recorder(env, self.origin), env, range(3, 4), Interrupt(), given)
         env.close()
 
     def __enter__(self) -> Browser:

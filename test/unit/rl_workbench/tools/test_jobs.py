@@ -38,9 +38,7 @@ def run_all(jobs: list[Job], at_once: int, interrupt: Interrupt | None = None) -
     made.map(made.run, jobs)
 
 
-def sleeping(
-    monkeypatch: pytest.MonkeyPatch, program: str = "import time; time.sleep(1000)"
-) -> None:
+def sleeping(monkeypatch: pytest.MonkeyPatch, program: str = "import time; time.sleep(1000)") -> None:
     """Trainings become another program."""
     words = [sys.executable, "-c", program]
     monkeypatch.setattr(jobs_module, "command", lambda *_: words)
@@ -55,9 +53,7 @@ def test_a_folder_that_another_training_holds_is_left_alone(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_training_that_is_killed_goes_on_bit_identically(
-    tmp_path: Path, monkeypatch, capsys
-) -> None:
+def test_a_training_that_is_killed_goes_on_bit_identically(tmp_path: Path, monkeypatch, capsys) -> None:
     killed, other = job(tmp_path / "a", **LONGER), job(tmp_path / "b", **LONGER)
     found: list[int] = []
     finish = jobs_module._finish

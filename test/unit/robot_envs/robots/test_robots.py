@@ -30,9 +30,7 @@ class TestEach:
     def test_it_keeps_what_environments_promise(self, identifier: str) -> None:
         check_robot_env(identifier, steps=40 if "Navigate" in identifier else 120)
 
-    def test_its_description_is_sound_and_names_all_that_its_task_asks_for(
-        self, identifier: str
-    ) -> None:
+    def test_its_description_is_sound_and_names_all_that_its_task_asks_for(self, identifier: str) -> None:
         made = gymnasium.registry[identifier].kwargs
         robot, task = named(made["robot"]), named(made["task"])()
         robot.check()

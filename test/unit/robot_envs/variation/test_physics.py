@@ -27,10 +27,7 @@ def joints_after(env: RobotEnv, action, steps: int = 1) -> dict[str, tuple[float
 
 def vary(backend: str = "bullet", start=None, tick: bool = False, **randomisation):
     """The rig with options that have one value each: low is high; with `tick`, each step is one."""
-    fixed = {
-        name: (value, value) if np.isscalar(value) else value
-        for name, value in randomisation.items()
-    }
+    fixed = {name: (value, value) if np.isscalar(value) else value for name, value in randomisation.items()}
     period = 0.001 if tick else PERIOD
     return make_rig(backend, start, randomisation=fixed, control_period=period)
 

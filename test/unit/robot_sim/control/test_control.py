@@ -213,9 +213,7 @@ def test_state_is_reported_on_every_tenth_update(hardware):
     ("kind", "params"),
     [(STATE, {"publish_rate": 1000.0}), (POSITION, {"joint": "stand_cart", "pid": {"p": 1.0}})],
 )
-def test_nothing_is_reported_to_nobody_and_the_next_record_once_somebody_listens(
-    hardware, kind, params
-):
+def test_nothing_is_reported_to_nobody_and_the_next_record_once_somebody_listens(hardware, kind, params):
     controller = built_in()[kind].create("c", params, hardware)
     samples = collect(controller)
     listeners = 0

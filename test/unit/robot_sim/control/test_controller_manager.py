@@ -132,9 +132,7 @@ def test_a_controller_that_raises_is_stopped_once_and_the_others_go_on(
     assert manager.hardware.joints["stand_cart"].command != 0.0
 
 
-def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(
-    manager, faults, monkeypatch
-):
+def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(manager, faults, monkeypatch):
     monkeypatch.setattr(Faulty, "error", KeyboardInterrupt)
     manager.load("faulty", {"type": "test/Faulty", "where": "update"})
     manager.switch(["faulty"], [], STRICT)
@@ -143,9 +141,7 @@ def test_a_ctrl_c_that_comes_while_a_controller_is_updated_is_no_fault_of_its(
     assert states(manager)["faulty"] == "running" and not faults
 
 
-def test_one_that_raises_while_it_is_made_or_started_is_refused_and_stops_all_the_same(
-    manager, faults
-):
+def test_one_that_raises_while_it_is_made_or_started_is_refused_and_stops_all_the_same(manager, faults):
     with pytest.raises(ControlError, match="Initializing controller 'faulty' failed: KeyError"):
         manager.load("faulty", {"type": "test/Faulty", "where": "create"})
     assert "faulty" not in states(manager)

@@ -30,9 +30,7 @@ def lift_urdf(interface, limit='lower="-1" upper="1" effort="100" velocity="2"')
 class Lift:
     """A lift in a lock-step world with one controller."""
 
-    def __init__(
-        self, world, interface, controller="", params=None, gains=None, period=0.0, **urdf
-    ):
+    def __init__(self, world, interface, controller="", params=None, gains=None, period=0.0, **urdf):
         text = lift_urdf(interface, **urdf)
         self.sim = Simulator(world, lockstep=True)
         made = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
@@ -149,9 +147,7 @@ def test_what_is_no_number_never_reaches_the_world(make, interface, controller, 
     assert math.isfinite(lift.joint.command)
 
 
-@pytest.mark.parametrize(
-    ("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)]
-)
+@pytest.mark.parametrize(("period", "ticks"), [(0.0, 1), (0.001, 1), (0.004, 4), (0.0025, 3), (1e-4, 1)])
 def test_controllers_run_on_every_control_period_with_the_nominal_dt(make, period, ticks):
     lift = make("Effort", period=period)
     calls = []
@@ -232,12 +228,8 @@ def test_parameters_of_limits_that_are_no_numbers_are_a_warning():
     assert turning.joints["rail"].limits.lower is None
 
 
-@pytest.mark.parametrize(
-    ("interface", "controller"), [("Position", POSITION), ("Velocity", VELOCITY)]
-)
-def test_the_effort_of_a_drive_speeds_no_joint_up_beyond_its_velocity_limit(
-    make, interface, controller
-):
+@pytest.mark.parametrize(("interface", "controller"), [("Position", POSITION), ("Velocity", VELOCITY)])
+def test_the_effort_of_a_drive_speeds_no_joint_up_beyond_its_velocity_limit(make, interface, controller):
     """Gazebo cuts every effort there; the limit is 2 m/s, and brakes act beyond it too."""
     lift = make(interface, controller, gains={"rail": {"p": 5000.0, "i_clamp": 0.0}})
     lift.model.body.reset_joint(0, 0.0, 2.5)

@@ -222,9 +222,7 @@ def test_a_goals_own_tolerances_override_or_disable_the_parameters():
     constraints = {"shoulder": {"trajectory": 0.1, "goal": 0.1}}
     rig = Rig("Effort", constraints=constraints).start()
     far = Tolerance(2.0, -1.0)
-    told = rig.pursue(
-        move((1.0, (1.0,))), path={"shoulder": Tolerance(-1.0)}, goal={"shoulder": far}
-    )
+    told = rig.pursue(move((1.0, (1.0,))), path={"shoulder": Tolerance(-1.0)}, goal={"shoulder": far})
     rig.run(1100)
     assert [outcome.kind for outcome in told.outcomes] == ["succeeded"]
     told = rig.pursue(move((1.0, (2.0,))), path={"shoulder": Tolerance(0.0, 0.5)})

@@ -257,9 +257,7 @@ def pursue(controller, points, path):
     return told
 
 
-@pytest.mark.parametrize(
-    ("interface", "path"), [("Effort", 0.02), ("Position", 0.01), ("Velocity", 0.01)]
-)
+@pytest.mark.parametrize(("interface", "path"), [("Effort", 0.02), ("Position", 0.01), ("Velocity", 0.01)])
 def test_a_quintic_is_followed_within_its_tolerances(sim, interface, path):
     made, controller = run_arm(sim, interface)
     points = [

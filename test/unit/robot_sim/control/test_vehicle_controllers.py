@@ -199,9 +199,7 @@ def test_a_description_without_a_distance_and_a_bicycle_of_no_length_are_refused
     for key in ("wheel_separation_h_multiplier", "wheel_radius_multiplier"):
         for value in (0.0, -1.0):
             with pytest.raises(ControlError, match=f"base/{key} must be above 0"):
-                built_in()[ACKERMANN["type"]].create(
-                    "base", ACKERMANN | {key: value}, bike.hardware
-                )
+                built_in()[ACKERMANN["type"]].create("base", ACKERMANN | {key: value}, bike.hardware)
     robot = add_robot(sim, "bot", two_wheels())
     description, create = robot.hardware.robot, built_in()[DIFF["type"]].create
     description.find("joint[@name='left_joint']/origin").set("xyz", "nan 0 0")

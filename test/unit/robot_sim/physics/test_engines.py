@@ -55,9 +55,7 @@ def cartpole(world):
 @pytest.mark.parametrize("angle", [-2.5, -0.7, 0.0, 0.3, 1.2, math.pi / 2])
 @pytest.mark.parametrize("rate", [-3.0, 0.0, 4.0])
 @pytest.mark.parametrize("force", [-5.0, 0.0, 2.0])
-def test_one_step_has_the_acceleration_of_the_equations_of_motion(
-    world, cartpole, angle, rate, force
-):
+def test_one_step_has_the_acceleration_of_the_equations_of_motion(world, cartpole, angle, rate, force):
     cartpole.body.reset_joint(0, 0.0, 0.5)
     cartpole.body.reset_joint(1, angle, rate)
     cartpole.body.apply_efforts((force, 0.0))
@@ -282,9 +280,7 @@ assert locale.localeconv()["decimal_point"] == ("," if sys.argv[1] == "comma" el
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "engine", ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))]
-)
+@pytest.mark.parametrize("engine", ["ode", pytest.param("mujoco", marks=pytest.mark.extras("mujoco"))])
 def test_a_decimal_comma_moves_no_robot_otherwise(tmp_path, engine):
     write_comma_locale(tmp_path)
     env = {**os.environ, "LOCPATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -39,9 +39,7 @@ WELL = {
     "solids.stl": TEXT + TEXT.replace("cube", "twin"),
     "cube.obj": OBJ,
     "tabs.obj": OBJ.replace(" ", "\t").replace("v", "  v"),
-    "colours.obj": OBJ.replace(
-        "\nf 1 3 2", " 0.1 0.2 0.3\nvn 0 0 1\nvt 0 0\nusemtl m\nf 1/1/1 3//1 2/1"
-    ),
+    "colours.obj": OBJ.replace("\nf 1 3 2", " 0.1 0.2 0.3\nvn 0 0 1\nvt 0 0\nusemtl m\nf 1/1/1 3//1 2/1"),
     "back.obj": OBJ.replace("f 1 3 2", "f -8 -6 -7") + "v 5 5 5\nv 6 6 6\n",
     "first.obj": OBJ[OBJ.index("f ") :] + OBJ[: OBJ.index("f ")],
     "groups.obj": "# x\no name\ng a\n" + OBJ.replace("1.0", "1e0").replace("\nf", "\ng b\nf", 1),

@@ -108,8 +108,7 @@ def test_what_robots_refer_to_in_gazebo_plugins_has_the_right_size(name):
 def test_a_static_mesh_is_hollow_where_it_is_hollow(sim, tmp_path):
     """A trough of two slopes: its convex hull would be full."""
     (tmp_path / "trough.obj").write_text(
-        "v -1 -1 1\nv -1 1 1\nv 0 -1 0\nv 0 1 0\nv 1 -1 1\nv 1 1 1\n"
-        "f 1 3 2\nf 2 3 4\nf 3 5 4\nf 4 5 6\n"
+        "v -1 -1 1\nv -1 1 1\nv 0 -1 0\nv 0 1 0\nv 1 -1 1\nv 1 1 1\nf 1 3 2\nf 2 3 4\nf 3 5 4\nf 4 5 6\n"
     )
     sim.world.spawn("t", static_mesh(tmp_path / "trough.obj"), Pose())
     height = rest_height(sim.world, parse_sdf(sdf_ball()), 0.6)

@@ -101,9 +101,7 @@ def test_joints_stand_as_the_poses_of_their_links(begun, anchor):
     links = "".join(
         f'<link name="{name}"><pose>{x} {y} {z} {roll} 0 0</pose>'
         f"<velocity>0 {speed} 0 {rate} 0 0</velocity></link>"
-        for (name, ((x, y, z), roll)), speed, rate in zip(
-            ends.items(), (0.0, 0.0), (2.0, 3.0), strict=True
-        )
+        for (name, ((x, y, z), roll)), speed, rate in zip(ends.items(), (0.0, 0.0), (2.0, 3.0), strict=True)
     )
     # Gazebo's model goes where its first link goes.
     model = "0 0 2 0 0 0" if anchor else f"0 0 2 {ANGLE} 0 0"

@@ -272,8 +272,7 @@ def test_a_fault_is_one_line_with_its_place(text, fault):
 def pair(a="", b="", of_model=""):
     """Two balls of 0.3 m on sliding joints, 0.1 m apart."""
     arms = "".join(
-        link(name, f"{x} 0 1 0 0 0", BALL + more)
-        + joint(f"j{name}", "prismatic", "base", name, "1 0 0")
+        link(name, f"{x} 0 1 0 0 0", BALL + more) + joint(f"j{name}", "prismatic", "base", name, "1 0 0")
         for name, x, more in (("a", -0.35, a), ("b", 0.35, b))
     )
     return sdf(of_model, link("base"), arms)

@@ -72,9 +72,7 @@ class Sdformat:
 @pytest.fixture(scope="session")
 def sdformat(tmp_path_factory):
     package = ["pkg-config", "--cflags", "--libs", "sdformat12"]
-    found = shutil.which(package[0]) and subprocess.run(
-        package, check=False, capture_output=True, text=True
-    )
+    found = shutil.which(package[0]) and subprocess.run(package, check=False, capture_output=True, text=True)
     if not found or found.returncode:
         pytest.skip("sdformat is missing: apt-get install libsdformat-dev pkgconf")
     program = tmp_path_factory.mktemp("sdformat") / "read"

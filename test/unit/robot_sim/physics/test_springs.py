@@ -67,9 +67,7 @@ def of_urdf(value):
     return parse_urdf(robot(WORLD, *links, *joints, more))
 
 
-DESCRIPTIONS = {
-    version: parse_sdf(on_a_spring(damping=20.0, version=version)) for version in VERSIONS
-}
+DESCRIPTIONS = {version: parse_sdf(on_a_spring(damping=20.0, version=version)) for version in VERSIONS}
 DESCRIPTIONS["urdf"] = of_urdf("<spring{0}>{1}</spring{0}>")
 DESCRIPTIONS["urdf by value"] = of_urdf('<spring{0} value="{1}"/>')
 

@@ -88,9 +88,7 @@ def test_a_texture_repeats(scene, tmp_path):
     assert [main_colour(picture[at[0], x]) for x in at] == ["r", "g", "r", "g"]
 
 
-def test_materials_of_one_file_have_their_colours_and_those_of_the_robots_file_give_way(
-    scene, tmp_path
-):
+def test_materials_of_one_file_have_their_colours_and_those_of_the_robots_file_give_way(scene, tmp_path):
     (tmp_path / "looks.mtl").write_text("newmtl left\nKd 1 0 0\nnewmtl right\nKd 0 0 1\n")
     put(scene, "it", mesh(tmp_path / "two.obj", TWO, rgba=(0.0, 1.0, 0.0, 1.0)))
     assert quarters(seen(scene)) == "rbrb"

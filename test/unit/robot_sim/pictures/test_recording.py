@@ -152,9 +152,7 @@ def test_what_cannot_be_recorded_is_refused(tmp_path, changed, text):
         RecordingOptions(**{"path": tmp_path / "a.mp4", **changed}).check()
 
 
-def test_a_video_without_its_encoder_is_refused_with_the_command_that_installs_it(
-    tmp_path, monkeypatch
-):
+def test_a_video_without_its_encoder_is_refused_with_the_command_that_installs_it(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(RecordingError, match=r"needs imageio-ffmpeg, .*/ws extras' installs"):
         options(tmp_path).check()

@@ -57,9 +57,7 @@ def where(picture: np.ndarray, channel: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0, 1.0), (0.6, 0.3, 1.4), (-0.7, -0.5, 0.6)])
-@pytest.mark.parametrize(
-    "shape", [BOX, '<sphere radius="0.2"/>', '<cylinder radius="0.2" length="0.4"/>']
-)
+@pytest.mark.parametrize("shape", [BOX, '<sphere radius="0.2"/>', '<cylinder radius="0.2" length="0.4"/>'])
 def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
     put(scene, shape, Pose(place))
     found = where(shown(scene), 0)
@@ -154,9 +152,7 @@ def test_links_are_where_the_engine_has_them():
     world.close()
 
 
-@pytest.mark.parametrize(
-    "place", [(0.0, 0.0, 1.0), (1.2, 0.3, 1.9), (-1.3, -0.5, 0.1), (0.0, -2.9, 1.3)]
-)
+@pytest.mark.parametrize("place", [(0.0, 0.0, 1.0), (1.2, 0.3, 1.9), (-1.3, -0.5, 0.1), (0.0, -2.9, 1.3)])
 def test_the_part_that_is_rendered_has_all_of_it(scene, place, monkeypatch):
     """Also at the edges, and where the camera stands within."""
     put(scene, '<box size="0.9 0.3 0.5"/>', Pose(place, from_rpy(0.3, 0.2, 0.9)))

@@ -70,9 +70,7 @@ class Labelled(Dot):
 def brighten(env: gymnasium.Env) -> gymnasium.Env:
     """From floats to what a CNN takes."""
     space = spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8)
-    return gymnasium.wrappers.TransformObservation(
-        env, lambda image: (255 * image).astype(np.uint8), space
-    )
+    return gymnasium.wrappers.TransformObservation(env, lambda image: (255 * image).astype(np.uint8), space)
 
 
 WRAPPER = f"{__name__}:brighten"

@@ -59,9 +59,7 @@ def test_noise_of_actions_is_a_standard_deviation() -> None:
     assert made.action_noise._sigma.tolist() == [0.2]
 
 
-CHOICES = (
-    "can't choose from Discrete(2), the actions of CartPole-v1; ppo, a2c, dqn-sb3, dqn, reinforce"
-)
+CHOICES = "can't choose from Discrete(2), the actions of CartPole-v1; ppo, a2c, dqn-sb3, dqn, reinforce"
 
 
 @pytest.mark.parametrize(

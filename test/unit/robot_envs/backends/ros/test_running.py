@@ -54,9 +54,7 @@ def test_another_one_in_its_place_is_told(master, other_master) -> None:
         fail(running, SimulatorError("model does not exist"))
 
 
-@pytest.mark.parametrize(
-    "error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")]
-)
+@pytest.mark.parametrize("error", [rospy.ROSException("publish() to a closed topic"), SimulatorError("x")])
 def test_so_is_the_end_of_ones_own_node(master, monkeypatch, error) -> None:
     running = RunningSimulator()
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)

@@ -132,9 +132,7 @@ def test_a_pause_makes_nothing_late(heard: Heard) -> None:
 def world(heard: Heard, monkeypatch: pytest.MonkeyPatch) -> RealtimeWorld:
     """A world whose services do nothing; it has a clock, and joint states at once."""
     joints = {name: JointState(0.0, 0.0, 0.0) for name in Scene([SEEING]).joints}
-    states = SimpleNamespace(
-        time=7.5, forget_unless_at=lambda _: None, wait_until=lambda _: (7.52, joints)
-    )
+    states = SimpleNamespace(time=7.5, forget_unless_at=lambda _: None, wait_until=lambda _: (7.52, joints))
     idle = SimpleNamespace(
         wait=lambda: None, publish=lambda _: None, join=lambda _: None,
         claim=lambda _: None, check_holder=lambda _: None,
