@@ -81,10 +81,9 @@ class SavedEnv(DrawnEnv):
                 raise SimulatorError(f"the snapshot can't be restored: {fault}")
             with undoable():
                 self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
-        except RestoreRefused:
-            raise
         except Exception as error:  # whatever a forged state leads to
-            if before is not None:
+            is_as_before = isinstance(error, RestoreRefused) and self._steps is not None
+            if before is not None and not is_as_before:
                 with contextlib.suppress(SimulatorError):  # a reset comes next
                     self._load(before)
             if isinstance(error, SimulatorError):

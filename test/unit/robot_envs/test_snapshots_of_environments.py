@@ -222,6 +222,20 @@ def test_imperfections_of_another_size_are_refused(begun, option, one, other):
         second.restore_state(first.save_state())
 
 
+def test_a_refused_file_of_another_variation_leaves_the_robot_as_it_was():
+    def varied(seed, backend):
+        env = gymnasium.make("cartpole/Balance-v0", randomisation={"mass": 0.5}, backend=backend).unwrapped
+        env.reset(seed=seed)
+        return env
+
+    with varied(1, "bullet") as env, varied(1, "bullet") as same, varied(2, "mujoco") as other:
+        same.save_state()
+        data = other.save_state().to_bytes()
+        with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
+            env.restore_state(EnvSnapshot.from_bytes(data))
+        assert returns(env) == returns(same)
+
+
 def test_a_refused_one_leaves_the_episode_as_it_is(begun):
     env, other = begun(), begun(backend="mujoco")
     with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
