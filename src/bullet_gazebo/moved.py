@@ -15,5 +15,12 @@ class OldNames(MetaPathFinder):
         """Raises ModuleNotFoundError for a module that moved; else returns None."""
         for old, new in PLACES:
             place = new + fullname.removeprefix(old)
-            if f"{fullname}.".startswith(f"{old}.") and find_spec(place) is not None:
-                raise ModuleNotFoundError(f"{fullname} is {place} now", name=fullname)
+            if f"{fullname}.".startswith(f"{old}.") and _is_there(place):
+                raise ModuleNotFoundError(f"{fullname} is {place} now")  # a name would have it dropped
+
+
+def _is_there(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ModuleNotFoundError:  # of a package above it
+        return False

@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from robot_envs.errors import SimulatorError
+from robot_envs.errors import RestoreRefused, SimulatorError
 from robot_sim.plain_data import Difference, differences
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import Shared
@@ -119,11 +119,18 @@ def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
     return [*differences(one.fits, other.fits), *differences(one.state, other.state)]
 
 
-def episode_of(snapshot: Snapshot) -> tuple[int, dict[str, Any]]:
-    """Returns when an episode has begun [ns] and what controllers hold; raises SimulatorError for none."""
-    episode = snapshot.state.get("episode")
+def whole_of(state: WorldSnapshot) -> tuple[Snapshot, int, dict[str, Any]]:
+    """Returns a snapshot, when its episode has begun [ns], and what controllers hold there.
+
+    Raises RestoreRefused if it can't be had, or is of no episode.
+    """
+    try:
+        whole = state.whole()
+    except SimulatorError as error:
+        raise RestoreRefused(str(error)) from error
+    episode = whole.state.get("episode")
     if isinstance(episode, dict):
         begun, held = episode.get("begun"), episode.get("held")
         if type(begun) is int and isinstance(held, dict):
-            return begun, held
-    raise SimulatorError("the snapshot is of no episode of an environment")
+            return whole, begun, held
+    raise RestoreRefused("the snapshot is of no episode of an environment")

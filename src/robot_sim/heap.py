@@ -7,9 +7,7 @@ ARENA_MAX = -8  # mallopt's M_ARENA_MAX
 
 def give_back() -> None:
     """Returns free memory to the system, which the C library would keep for later."""
-    function = _function("malloc_trim")
-    if function is not None:
-        function(0)
+    getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)
 
 
 def use_one_arena() -> None:
@@ -18,10 +16,4 @@ def use_one_arena() -> None:
     By default glibc makes up to eight heaps a core, and each keeps its free memory. Python's threads
     allocate one after the other anyway.
     """
-    function = _function("mallopt")
-    if function is not None:
-        function(ARENA_MAX, 1)
-
-
-def _function(name: str) -> "ctypes._NamedFuncPointer | None":
-    return getattr(ctypes.CDLL(None), name, None)
+    getattr(ctypes.CDLL(None), "mallopt", lambda *_: None)(ARENA_MAX, 1)

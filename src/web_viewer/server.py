@@ -28,15 +28,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from web_viewer import keys
-from web_viewer.address import (
-    FIRST_PORT,
-    LOOPBACK,
-    Address,
-    PortInUse,
-    check,
-    has_display,
-    is_loopback,
-)
+from web_viewer.address import FIRST_PORT, LOOPBACK, Address, PortInUse, check, has_display, is_loopback
 
 Answer = Callable[[Any, Request], Response | None]
 Say = Callable[[str], object]
@@ -133,12 +125,12 @@ class Value(msgspec.Struct, forbid_unknown_fields=True):
     value: Any
 
 
-class GuiUpdateMessage(msgspec.Struct, tag=True):
+class GuiUpdateMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     uuid: str
     updates: Value
 
 
-class ViewerCameraMessage(msgspec.Struct, tag=True):
+class ViewerCameraMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     wxyz: tuple[Number, Number, Number, Number]
     position: Vector
     look_at: Vector
@@ -150,11 +142,11 @@ class ViewerCameraMessage(msgspec.Struct, tag=True):
     image_width: Side
 
 
-class GetRenderResponseMessage(msgspec.Struct, tag=True):
+class GetRenderResponseMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     payload: bytes
 
 
-class CommandTriggerMessage(msgspec.Struct, tag=True):
+class CommandTriggerMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     uuid: str
 
 
@@ -266,12 +258,7 @@ class ServedPage:
     """
 
     def __init__(
-        self,
-        title: str,
-        camera: Point,
-        look_at: Point,
-        host: str = LOOPBACK,
-        port: int | None = None,
+        self, title: str, camera: Point, look_at: Point, host: str = LOOPBACK, port: int | None = None
     ) -> None:
         check(host, port)
         token = "" if is_loopback(host) else secrets.token_urlsafe(TOKEN_BYTES)

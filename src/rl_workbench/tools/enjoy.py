@@ -16,7 +16,13 @@ WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
     add_policy_flags(parser)
-    parser.add_argument("--episodes", type=number(1), default=1, metavar="N", help="default 1")
+    parser.add_argument(
+        "--episodes",
+        type=number(1),
+        default=1,
+        metavar="N",
+        help="of a window (default 1); a page has a field for the seed",
+    )
 
 
 def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:

@@ -91,12 +91,9 @@ def attempt(job: Job, program: Program, is_stopped: Callable[[], bool]) -> str:
 
     `is_stopped` is called several times a second; a KeyboardInterrupt stops the training, too.
     """
-    try:
-        words = command(job, program.words)
-    except WorkbenchError as error:  # another training runs in its folder
-        return str(error)
     prefix = ["setpriv", "--pdeathsig", "KILL", "--"] if shutil.which("setpriv") else []
     try:
+        words = command(job, program.words)
         job.folder.parent.mkdir(parents=True, exist_ok=True)
         with job.log.open("ab") as output:
             process = subprocess.Popen(
@@ -107,6 +104,8 @@ def attempt(job: Job, program: Program, is_stopped: Callable[[], bool]) -> str:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C in the terminal must reach this process alone
             )
+    except WorkbenchError as error:  # another training runs in its folder
+        return str(error)
     except OSError as error:
         raise WorkbenchError(f"can't train into {job.folder}: {error.strerror}") from error
     code, cpu_seconds, was_stopped = _finish(process, is_stopped)
@@ -142,6 +141,9 @@ def _finish(process: subprocess.Popen[bytes], is_stopped: Callable[[], bool]) ->
             must_end = is_stopped()
         except KeyboardInterrupt:  # Ray cancels a task
             must_end = True
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
         if must_end and deadline == math.inf:
             deadline = time.monotonic() + TIME_TO_END
             os.kill(process.pid, signal.SIGTERM)

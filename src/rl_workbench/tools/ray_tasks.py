@@ -74,7 +74,7 @@ class RayTasks:
         while not ray.wait([task], timeout=POLL)[0]:
             if is_stopped():
                 ray.cancel(task)  # raises KeyboardInterrupt in the task, which saves
-                if not ray.wait([task], timeout=TIME_TO_END)[0]:
+                if not ray.wait([task], timeout=2.0 * TIME_TO_END)[0]:
                     ray.cancel(task, force=True)
                 return ""
         try:

@@ -92,11 +92,7 @@ class Playback:
     """The controls of the page: as in `show_run`. One thread calls `tick`; clicks come in viser's threads."""
 
     def __init__(
-        self,
-        gui: viser.GuiApi,
-        recorder: EpisodeRecorder,
-        policies: tuple[str, ...],
-        seed: int,
+        self, gui: viser.GuiApi, recorder: EpisodeRecorder, policies: tuple[str, ...], seed: int
     ) -> None:
         self._recorder = recorder
         self._lock = threading.RLock()

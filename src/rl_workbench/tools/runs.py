@@ -98,7 +98,7 @@ def cost_file(folder: Path) -> Path:
 
 
 def cost_of(folder: Path) -> dict[str, Any]:
-    """Returns wall time and processor time [s], and when the processes ran; empty if unknown."""
+    """Returns the processor time of a training's processes [s]; empty if unknown."""
     return read_leniently(cost_file(folder))
 
 

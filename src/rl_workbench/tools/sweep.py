@@ -7,11 +7,13 @@ FOLDER/best.yaml          the best options, for --config
 """
 
 import argparse
+import contextlib
 import threading
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError, need
@@ -116,7 +118,7 @@ def open_study(sweep: Sweep) -> Any:
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     # Other threads may write for long on a slow disk.
     options = {"connect_args": {"timeout": 60}}
-    storage = optuna.storages.RDBStorage(f"sqlite:///{sweep.folder / STUDY}", options)
+    storage = optuna.storages.RDBStorage(f"sqlite:///{quote(str(sweep.folder / STUDY))}", options)
     study = optuna.create_study(storage=storage, study_name="sweep", direction="maximize",
                                 load_if_exists=True)  # fmt: skip
     trials = study.get_trials(deepcopy=False)
@@ -198,16 +200,18 @@ class Judge:
 
     def is_promising(self) -> bool:
         """Reports new evaluations; returns whether to continue the trial."""
-        path = self._folder / SCALARS
-        size = path.stat().st_size if path.exists() else 0
-        if size != self._size:
-            self._size = size
-            for value in curve_of(self._folder, EVALUATION).values[self.evaluations :].tolist():
-                self.evaluations += 1
-                self._trial.report(value, self.evaluations)
-                self._is_pruned = self._trial.should_prune()
-                if self._is_pruned:
-                    break
+        values: list[float] = []
+        with contextlib.suppress(OSError, WorkbenchError):  # it can't be read now
+            size = (self._folder / SCALARS).stat().st_size
+            if size != self._size:
+                values = curve_of(self._folder, EVALUATION).values[self.evaluations :].tolist()
+                self._size = size
+        for value in values:
+            self.evaluations += 1
+            self._trial.report(value, self.evaluations)
+            self._is_pruned = self._trial.should_prune()
+            if self._is_pruned:
+                break
         return not self._is_pruned
 
 

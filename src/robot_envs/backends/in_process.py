@@ -13,7 +13,7 @@ from robot_envs.errors import RestoreRefused, RobotEnvError, SimulatorError
 from robot_envs.files import resources
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
-from robot_envs.snapshot import WorldSnapshot, episode_of
+from robot_envs.snapshot import WorldSnapshot, whole_of
 from robot_envs.variation import Variation
 from robot_envs.variation.applying import Applier
 from robot_envs.variation.parts import RobotPart
@@ -255,8 +255,7 @@ class InProcessWorld(RobotBackend):
         return snapshot
 
     def restore_state(self, state: WorldSnapshot) -> str:
-        snapshot, fault = state.whole(), ""
-        begun, held = episode_of(snapshot)
+        (snapshot, begun, held), fault = whole_of(state), ""
         try:
             self._sim.restore_state(snapshot)
         except SnapshotError as error:

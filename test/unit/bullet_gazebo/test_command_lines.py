@@ -179,6 +179,7 @@ def test_a_spawner_waits_while_a_model_is_being_spawned(monkeypatch, spawns, wai
         ("control.pid", "bullet_gazebo.control.pid is robot_sim.control.pid now"),
         ("ros.plugins.plugin_loader", "bullet_gazebo.ros.plugins is bullet_gazebo.plugins now"),
         ("nothing", "No module named 'bullet_gazebo.nothing'"),
+        ("plugins.nothing", "No module named 'bullet_gazebo.plugins.nothing'"),
     ],
 )
 def test_an_old_import_says_where_it_is(old, told):

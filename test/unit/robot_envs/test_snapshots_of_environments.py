@@ -236,11 +236,19 @@ def test_a_refused_file_of_another_variation_leaves_the_robot_as_it_was():
         assert returns(env) == returns(same)
 
 
+class Gone:
+    """What another environment's simulator has kept, which has ended."""
+
+    def whole(self):
+        raise SimulatorError("it was closed")
+
+
 def test_a_refused_one_leaves_the_episode_as_it_is(begun):
     env, other = begun(), begun(backend="mujoco")
-    with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
-        env.restore_state(other.save_state())
-    env.step(1)
+    for world, reason in ((other.save_state().world, "engine .Mujoco., and here"), (Gone(), "closed")):
+        with pytest.raises(SimulatorError, match=reason):
+            env.restore_state(replace(env.save_state(), world=world))
+        env.step(1)
 
 
 class Borrowing(BalanceTask):

@@ -36,7 +36,7 @@ from robot_envs.backends.ros.running import (
 from robot_envs.backends.world_files import loose_joints
 from robot_envs.errors import RestoreRefused, SimulatorError
 from robot_envs.scene import Scene
-from robot_envs.snapshot import WorldSnapshot, episode_of
+from robot_envs.snapshot import WorldSnapshot, whole_of
 from robot_envs.variation import Variation
 from robot_envs.world_state import (
     Commands,
@@ -276,8 +276,7 @@ class LockstepWorld(RobotBackend):
             fault = self._restored(RestoreStateRequest(name=state.name, seed=seed))
             begun, held = state.begun, state.held
         else:
-            whole = state.whole()
-            begun, held = episode_of(whole)
+            whole, begun, held = whole_of(state)
             with self._simulator:
                 self._world.claim(self)
             self._look(self._names)  # sensors that states have are read from now on

@@ -15,7 +15,7 @@ from robot_envs.backends.ros.running import SharedWorld, physics_step
 from robot_envs.backends.world_files import world_models
 from robot_envs.errors import RobotEnvError, SimulatorError, SimulatorFault, SimulatorHangs
 from robot_envs.scene import Scene
-from robot_envs.snapshot import WorldSnapshot, episode_of
+from robot_envs.snapshot import WorldSnapshot, whole_of
 from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.constants import NANOSECONDS
@@ -195,11 +195,10 @@ class OwnWorld(RobotBackend):
 
     def restore_state(self, state: WorldSnapshot) -> str:
         if not isinstance(state, JournalledSnapshot) or state.of is not self:
-            whole = state.whole()
+            whole, begun, _ = whole_of(state)
             begin = partial(LockstepWorld.restore_state, state=whole)
             fault = self._perform(begin)
-            passed = whole.state["now"] - episode_of(whole)[0]
-            self._journal, self._passed, self._last = [begin], passed, None
+            self._journal, self._passed, self._last = [begin], whole.state["now"] - begun, None
             return fault
 
         def restore(world: LockstepWorld) -> str:
