@@ -16,13 +16,7 @@ from collections.abc import Callable
 import reporting
 import rospy
 from gazebo_msgs.msg import ModelState
-from gazebo_msgs.srv import (
-    DeleteModel,
-    GetWorldProperties,
-    SetModelConfiguration,
-    SetModelState,
-    SpawnModel,
-)
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SetModelState, SpawnModel
 from geometry_msgs.msg import Pose
 from std_srvs.srv import Empty
 

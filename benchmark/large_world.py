@@ -67,10 +67,7 @@ def content(suffix: str, points: np.ndarray, faces: np.ndarray) -> bytes:
         lines = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in points.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
         return "\n".join(lines).encode()
-    numbers = (
-        " ".join(f"{x:.6g}" for x in points.ravel().tolist()),
-        " ".join(map(str, faces.ravel())),
-    )
+    numbers = (" ".join(f"{x:.6g}" for x in points.ravel().tolist()), " ".join(map(str, faces.ravel())))
     return COLLADA.format(points.size, len(points), numbers[0], len(faces), numbers[1]).encode()
 
 
@@ -123,10 +120,7 @@ def main() -> None:
             for which, target in TARGETS.items():
                 found[engine][which] = start(world, chosen.models, option)
                 used, took = found[engine][which]
-                print(
-                    f"{engine + ', ' + which:20} {used:14.1f} {took:10.1f} {target:7.0f}",
-                    flush=True,
-                )
+                print(f"{engine + ', ' + which:20} {used:14.1f} {took:10.1f} {target:7.0f}", flush=True)
     reporting.write(chosen.out, "large_world", {"settings": vars(chosen) | {"out": ""}, "seconds": found})
 
 

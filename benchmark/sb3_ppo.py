@@ -25,13 +25,7 @@ def learn(seed: int, steps: int, backend: str) -> dict[str, float]:
     try:
         begin = time.perf_counter()
         model = PPO(
-            "MlpPolicy",
-            env,
-            learning_rate=2e-3,
-            n_steps=1024,
-            batch_size=256,
-            gamma=0.995,
-            seed=seed,
+            "MlpPolicy", env, learning_rate=2e-3, n_steps=1024, batch_size=256, gamma=0.995, seed=seed
         )
         model.learn(steps)
         lengths = [episode["l"] for episode in model.ep_info_buffer or []][-WINDOW:]

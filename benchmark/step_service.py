@@ -57,9 +57,7 @@ def client_rate(robots: int, count: int, rounds: int, ready: Callable[[], object
         client.reset()
         ready()
         return rates(
-            lambda index: client.step(TICKS, dict.fromkeys(names, 0.02 * (index % 2))),
-            count,
-            rounds,
+            lambda index: client.step(TICKS, dict.fromkeys(names, 0.02 * (index % 2))), count, rounds
         )
 
 

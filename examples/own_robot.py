@@ -9,16 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from robot_envs import (
-    Commands,
-    InitialState,
-    LinkQuery,
-    Robot,
-    RobotEnv,
-    StateQuery,
-    Task,
-    WorldState,
-)
+from robot_envs import Commands, InitialState, LinkQuery, Robot, RobotEnv, StateQuery, Task, WorldState
 
 ARM = Robot(
     urdf="package://cartpole/urdf/two_link_arm.urdf.xacro",

@@ -184,11 +184,7 @@ def from_model(message: SceneModel) -> VisibleModel:
         message.number,
         message.name,
         [
-            Link(
-                link.name,
-                collisions=_from_shapes(link.collisions),
-                visuals=_from_shapes(link.visuals),
-            )
+            Link(link.name, collisions=_from_shapes(link.collisions), visuals=_from_shapes(link.visuals))
             for link in message.links
         ],
         [_from_joint(joint) for joint in message.joints],

@@ -135,10 +135,7 @@ class CartPoleVariation(NamedTuple):
     def of_robot(self) -> Variation:
         """Returns the same variation by names of links and joints."""
         return Variation(
-            {
-                CART_LINK: LinkScale(self.cart_mass),
-                POLE_LINK: LinkScale(self.pole_mass, self.pole_length),
-            },
+            {CART_LINK: LinkScale(self.cart_mass), POLE_LINK: LinkScale(self.pole_mass, self.pole_length)},
             damping={CART_JOINT: self.cart_friction, POLE_JOINT: self.pole_friction},
         )
 

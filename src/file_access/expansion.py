@@ -37,9 +37,7 @@ class CannotExpand(Exception):
 
 
 def expand(
-    path: str | os.PathLike[str],
-    mappings: Mapping[str, str] | None = None,
-    limits: limited.Limits = LIMITS,
+    path: str | os.PathLike[str], mappings: Mapping[str, str] | None = None, limits: limited.Limits = LIMITS
 ) -> str:
     """Returns the XML text of a URDF or xacro file; raises CannotExpand if it is broken or beyond a limit."""
     return _ask("xml", os.fspath(path), mappings, limits)

@@ -16,14 +16,7 @@ from lockstep_runner.clock import Clock, Condition
 from lockstep_runner.notices import tell, tell_once
 from lockstep_runner.topics import Topics
 from lockstep_runner.triggers import Triggers
-from lockstep_runner.world import (
-    NANOSECONDS,
-    NODE,
-    RunsByItself,
-    ScriptWorld,
-    WorldFailed,
-    WorldGone,
-)
+from lockstep_runner.world import NANOSECONDS, NODE, RunsByItself, ScriptWorld, WorldFailed, WorldGone
 
 FAILED = 1  # exit code
 OTHERS = 2.0  # [s of wall time] for another node to come up before time passes

@@ -207,8 +207,7 @@ class Topics:
                 )
             return True
         tell_once(
-            f"others on {name}",
-            f"{node} publishes on {name}, too, in wall time: its messages are left out",
+            f"others on {name}", f"{node} publishes on {name}, too, in wall time: its messages are left out"
         )
         return False
 

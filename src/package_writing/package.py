@@ -116,11 +116,7 @@ def _completed(request: PackageRequest, copied: Copied, made: Path, loose: str) 
 
     def with_more(survey: Survey | None) -> str:
         text = contents.render(
-            "control.urdf.xacro.in",
-            name=request.name,
-            urdf=copied.place,
-            survey=survey,
-            loose=loose,
+            "control.urdf.xacro.in", name=request.name, urdf=copied.place, survey=survey, loose=loose
         )
         (made / "urdf" / control).write_text(text, encoding="utf-8")
         return expanded(made / "urdf" / control, request.arguments)

@@ -42,10 +42,7 @@ def stance(model: ModelDescription) -> dict[str, float]:
 
 
 def _stand(
-    model: ModelDescription,
-    on: Sequence[str],
-    turned: Mapping[str, Joint],
-    starts: dict[str, float],
+    model: ModelDescription, on: Sequence[str], turned: Mapping[str, Joint], starts: dict[str, float]
 ) -> None:
     """Moves the joints `turned`, as little as it takes and within their stops, so that the feet carry it."""
     zero = link_poses(model, Pose(), {})

@@ -82,12 +82,7 @@ class Survey:
 
 
 def look_at(
-    xml: str,
-    interface: str | None,
-    resources: Resources,
-    *,
-    free: bool = False,
-    passive: Sequence[str] = (),
+    xml: str, interface: str | None, resources: Resources, *, free: bool = False, passive: Sequence[str] = ()
 ) -> Survey:
     """Surveys a URDF, whose base stays free if `free`.
 

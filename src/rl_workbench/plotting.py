@@ -67,9 +67,7 @@ def moving_average(values: Sequence[float] | np.ndarray, window: int = WINDOW) -
     return (sums[ends] - sums[starts]) / (ends - starts)
 
 
-def mean_over_seeds(
-    curves: Sequence[SeedCurve],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def mean_over_seeds(curves: Sequence[SeedCurve]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Returns positions, mean over all seeds, and the ends of its 95 % interval, each (P,).
 
     They go from where each has a value to the end of the longest. A seed that has ended counts with its last

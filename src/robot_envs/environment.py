@@ -252,10 +252,7 @@ class RobotEnv(SavedEnv):
         observation = self._observe(measured)
         self._steps = 0
         self._show()
-        return observation, {
-            **checks.checked(self.task, "info", self._evaluator.info(state), dict),
-            **info,
-        }
+        return observation, {**checks.checked(self.task, "info", self._evaluator.info(state), dict), **info}
 
     def _begin(self, start: InitialState | EnvSnapshot, seed: int) -> WorldState:
         if isinstance(start, EnvSnapshot):

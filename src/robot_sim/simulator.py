@@ -47,12 +47,7 @@ class Simulator(Shared):
     """
 
     def __init__(
-        self,
-        world: World,
-        *,
-        lockstep: bool = False,
-        max_update_rate: float = 1000.0,
-        relatch: bool = True,
+        self, world: World, *, lockstep: bool = False, max_update_rate: float = 1000.0, relatch: bool = True
     ) -> None:
         """
         Args:
@@ -319,10 +314,7 @@ class Simulator(Shared):
         parts, faults = state["parts"], []
         there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
         robots = zip(self.robots, state["robots"], strict=True)
-        for loads in (
-            *(partial(robot.load_state_dict, own) for robot, own in robots),
-            partial(load, there),
-        ):
+        for loads in (*(partial(robot.load_state_dict, own) for robot, own in robots), partial(load, there)):
             try:
                 loads()
             except StateError as error:  # of a user's class; all else is restored

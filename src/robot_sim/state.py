@@ -16,17 +16,7 @@ from robot_sim.physics.description import Shape
 from robot_sim.physics.engine import Side, Twist
 from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.model import Model
-from robot_sim.physics.pose import (
-    ZERO,
-    Pose,
-    Vector,
-    add,
-    conjugate,
-    cross,
-    rotate,
-    scale,
-    subtract,
-)
+from robot_sim.physics.pose import ZERO, Pose, Vector, add, conjugate, cross, rotate, scale, subtract
 from robot_sim.physics.world import World, seen_from
 
 SCOPE = "::"
@@ -283,9 +273,7 @@ class StateReader:
             self._resolve()
         contacts = contact_pairs(self._world, self._wanted) if self._touch and stepped else []
         return StateAnswer(
-            {model.name: model.state() for model in self._models},
-            [read() for read in self._links],
-            contacts,
+            {model.name: model.state() for model in self._models}, [read() for read in self._links], contacts
         )
 
     def _resolve(self) -> None:

@@ -1,13 +1,6 @@
 """A client for one service, and its errors, which `StepClient` raises, too. See `ros_calls.service`."""
 
-from ros_calls.service import (
-    TIMEOUT,
-    ServiceClient,
-    ServiceFailed,
-    ServiceGone,
-    ServiceHangs,
-    ServiceMissing,
-)
+from ros_calls.service import TIMEOUT, ServiceClient, ServiceFailed, ServiceGone, ServiceHangs, ServiceMissing
 
 __all__ = [
     "TIMEOUT", "ServiceClient", "ServiceFailed", "ServiceGone", "ServiceHangs", "ServiceMissing",

@@ -32,10 +32,7 @@ class DynamicServer(Server):
     """
 
     def __init__(
-        self,
-        parameters: Sequence[Parameter],
-        apply: Callable[[Config, int], Config],
-        namespace: str = "",
+        self, parameters: Sequence[Parameter], apply: Callable[[Config, int], Config], namespace: str = ""
     ) -> None:
         self._kinds = [(parameter.kind, parameter.name) for parameter in parameters]
         super().__init__(_configuration(parameters), apply, namespace)

@@ -29,11 +29,7 @@ from bullet_gazebo.common.messages import (
     to_twist_stamped,
 )
 from bullet_gazebo.common.publishing import ThinnedTopic, Thinner
-from bullet_gazebo.control.trajectory_action import (
-    GripperAction,
-    TrajectoryTopics,
-    to_controller_state,
-)
+from bullet_gazebo.control.trajectory_action import GripperAction, TrajectoryTopics, to_controller_state
 from robot_sim.control.controllers.base import Controller, Input, Output
 from robot_sim.control.controllers.gripper import GripperActionController
 from robot_sim.control.controllers.joint_trajectory import JointTrajectoryController
@@ -203,12 +199,7 @@ class PidTopics:
     """
 
     def __init__(
-        self,
-        sim: Simulator,
-        thinner: Thinner,
-        pid: Pid,
-        namespace: str,
-        changed: Callable[[], None],
+        self, sim: Simulator, thinner: Thinner, pid: Pid, namespace: str, changed: Callable[[], None]
     ) -> None:
         """`changed` is called under the simulator's lock when the gains change."""
         self._sim = sim

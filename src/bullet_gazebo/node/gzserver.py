@@ -26,11 +26,7 @@ from bullet_gazebo.common.node_process import (
 )
 from bullet_gazebo.common.publishing import Thinner, advertise_states
 from bullet_gazebo.common.rospy_connections import Reception, bound_messages, hang_up_on_nonsense
-from bullet_gazebo.common.rospy_internals import (
-    answer_xmlrpc,
-    free_polls_at_once,
-    registered_together,
-)
+from bullet_gazebo.common.rospy_internals import answer_xmlrpc, free_polls_at_once, registered_together
 from bullet_gazebo.journal.interception import record_messages, record_parameters, record_services
 from bullet_gazebo.journal.journal import WorldJournal
 from bullet_gazebo.journal.journal_output import JournalOutput
@@ -41,12 +37,7 @@ from bullet_gazebo.plugins.plugin_loader import PluginRegistry
 from bullet_gazebo.scene import SceneServer
 from bullet_gazebo.services.advance_service import AdvanceService
 from bullet_gazebo.services.snapshot_services import SnapshotServices
-from bullet_gazebo.services.spawn_services import (
-    SpawnServices,
-    fill_world,
-    load_plugins,
-    read_world,
-)
+from bullet_gazebo.services.spawn_services import SpawnServices, fill_world, load_plugins, read_world
 from bullet_gazebo.services.step_service import StepService
 from bullet_gazebo.services.world_services import WorldControl, advertise_world_services
 from robot_sim.heap import use_one_arena

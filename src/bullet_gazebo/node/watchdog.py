@@ -116,10 +116,7 @@ class StallWatch:
     """
 
     def __init__(
-        self,
-        sim: Simulator,
-        report: Callable[[str], None],
-        clock: Callable[[], float] = time.monotonic,
+        self, sim: Simulator, report: Callable[[str], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         """`report` gets one text for each stall; `clock` returns [s]."""
         self._sim = sim

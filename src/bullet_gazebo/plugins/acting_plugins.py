@@ -14,13 +14,7 @@ from trajectory_msgs.msg import JointTrajectory
 from bullet_gazebo.common.dynamic_server import DynamicServer, Parameter
 from bullet_gazebo.common.messages import bad_number, from_transform, to_transform, to_vector
 from bullet_gazebo.plugins.plugin_loader import PluginContext
-from bullet_gazebo.plugins.sensor_topics import (
-    ContextPlugin,
-    advertised,
-    namespace_of,
-    subscribe,
-    topic_in,
-)
+from bullet_gazebo.plugins.sensor_topics import ContextPlugin, advertised, namespace_of, subscribe, topic_in
 from robot_sim.drives.odometry import Period
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.pose import ZERO, Pose, Vector, rotate, scale, subtract

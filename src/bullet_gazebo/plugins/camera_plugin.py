@@ -8,13 +8,7 @@ from typing import ClassVar
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty
 
-from bullet_gazebo.plugins.camera_topics import (
-    CameraTopics,
-    offer_rate,
-    read_image,
-    scope_of,
-    stream_of,
-)
+from bullet_gazebo.plugins.camera_topics import CameraTopics, offer_rate, read_image, scope_of, stream_of
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     MODEL,

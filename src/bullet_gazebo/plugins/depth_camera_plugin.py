@@ -18,13 +18,7 @@ from bullet_gazebo.plugins.camera_topics import (
     stream_of,
 )
 from bullet_gazebo.plugins.plugin_loader import PluginContext
-from bullet_gazebo.plugins.sensor_topics import (
-    MODEL,
-    ContextPlugin,
-    SensorTopics,
-    TopicSource,
-    topic_in,
-)
+from bullet_gazebo.plugins.sensor_topics import MODEL, ContextPlugin, SensorTopics, TopicSource, topic_in
 from robot_sim.physics.files.elements import truth
 from robot_sim.sensors.camera_sensors import KINECT, DepthSensor
 from robot_sim.sensors.pinhole import CameraView, PinholeCamera

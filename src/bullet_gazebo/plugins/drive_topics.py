@@ -9,12 +9,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
-from bullet_gazebo.common.messages import (
-    bad_number,
-    to_odometry,
-    to_odometry_transform,
-    to_transform,
-)
+from bullet_gazebo.common.messages import bad_number, to_odometry, to_odometry_transform, to_transform
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import (
     ContextPlugin,

@@ -6,13 +6,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_gazebo.common.messages import to_imu
 from bullet_gazebo.plugins.plugin_loader import PluginContext
-from bullet_gazebo.plugins.sensor_topics import (
-    MODEL,
-    SensorPlugin,
-    TopicSource,
-    offer_shared,
-    topic_in,
-)
+from bullet_gazebo.plugins.sensor_topics import MODEL, SensorPlugin, TopicSource, offer_shared, topic_in
 from robot_sim.sensors.imu import ImuSensor, ModelImu
 
 

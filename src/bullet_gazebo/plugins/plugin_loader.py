@@ -21,13 +21,7 @@ from bullet_gazebo_msgs.msg import SceneSensor
 
 from bullet_gazebo.common.messages import to_pose_msg
 from bullet_gazebo.common.publishing import Thinner
-from robot_sim.physics.description import (
-    CONTROL_PLUGIN,
-    DescriptionError,
-    Plugin,
-    Sensor,
-    library_of,
-)
+from robot_sim.physics.description import CONTROL_PLUGIN, DescriptionError, Plugin, Sensor, library_of
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.rendering import CameraRenderer

@@ -8,13 +8,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
 from bullet_gazebo.common.messages import to_time
-from bullet_gazebo.plugins.camera_topics import (
-    QUEUE,
-    CameraTopics,
-    camera_info,
-    show_camera,
-    stream_of,
-)
+from bullet_gazebo.plugins.camera_topics import QUEUE, CameraTopics, camera_info, show_camera, stream_of
 from bullet_gazebo.plugins.depth_camera_plugin import to_cloud, to_depth_image
 from bullet_gazebo.plugins.plugin_loader import PluginContext
 from bullet_gazebo.plugins.sensor_topics import ContextPlugin, SensorTopics, frame_of, topic_in

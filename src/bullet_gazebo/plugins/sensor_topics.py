@@ -83,12 +83,7 @@ class Topic(Shared):
     """A topic of a sensor; see `SensorTopics.advertise`."""
 
     def __init__(
-        self,
-        name: str,
-        kind: type,
-        queue: int,
-        latch: bool = False,
-        newcomers: "Newcomers | None" = None,
+        self, name: str, kind: type, queue: int, latch: bool = False, newcomers: "Newcomers | None" = None
     ) -> None:
         self._publisher = rospy.Publisher(
             name, kind, subscriber_listener=newcomers, tcp_nodelay=True, latch=latch, queue_size=queue
@@ -159,13 +154,7 @@ class SensorTopics(Shared):
         self._clock.look()
 
     def advertise(
-        self,
-        name: str,
-        kind: type,
-        queue: int = 1,
-        latch: bool = False,
-        wakes: bool = True,
-        content: int = 0,
+        self, name: str, kind: type, queue: int = 1, latch: bool = False, wakes: bool = True, content: int = 0
     ) -> Topic:
         """Returns a topic; its subscribers start the measurements if it `wakes` the sensor.
 

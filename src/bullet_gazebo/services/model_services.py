@@ -17,15 +17,7 @@ from bullet_gazebo.common.messages import (
     to_twist_msg,
     to_vector,
 )
-from bullet_gazebo.services import (
-    NO_LINK,
-    NO_MODEL,
-    SCOPE,
-    ServiceRefused,
-    check_message,
-    existing,
-    offer,
-)
+from bullet_gazebo.services import NO_LINK, NO_MODEL, SCOPE, ServiceRefused, check_message, existing, offer
 from robot_sim.physics.description import DescriptionError
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import AT_REST

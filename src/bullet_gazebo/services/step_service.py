@@ -27,14 +27,7 @@ from bullet_gazebo.common.messages import (
 )
 from bullet_gazebo.common.node_process import seed_random_numbers
 from bullet_gazebo.services import NO_LINK, ServiceRefused, existing, offer
-from bullet_gazebo.services.step_requests import (
-    MAX_TICKS,
-    SLICE,
-    Addresses,
-    Commanded,
-    StepPlan,
-    query_of,
-)
+from bullet_gazebo.services.step_requests import MAX_TICKS, SLICE, Addresses, Commanded, StepPlan, query_of
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.properties import PropertyError, set_link_friction
 from robot_sim.sensors.sensing import Sensing
@@ -134,10 +127,7 @@ class StepService:
             handle = self.series << COUNTED | self._count % 2**COUNTED
             self._prepared[handle] = prepared
             return srv.PrepareStepResponse(
-                success=True,
-                handle=handle,
-                joints=prepared.addresses.joint_names,
-                models=prepared.models,
+                success=True, handle=handle, joints=prepared.addresses.joint_names, models=prepared.models
             )
 
     def _step_prepared(self, request: srv.PreparedStepRequest) -> srv.PreparedStepResponse:

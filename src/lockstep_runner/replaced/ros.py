@@ -181,11 +181,7 @@ def replace_services(runner: ScriptRunner) -> None:
     begin, call = ServiceProxy.__init__, ServiceProxy.call
 
     def beginning(
-        self: ServiceProxy,
-        name: str,
-        service_class: Any,
-        persistent: bool = False,
-        headers: Any = None,
+        self: ServiceProxy, name: str, service_class: Any, persistent: bool = False, headers: Any = None
     ) -> None:
         begin(self, name, service_class, True, headers)
         self._lockstep_guard = threading.Lock()

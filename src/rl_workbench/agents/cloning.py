@@ -73,9 +73,7 @@ class CloningAgent:
             SingleChoice(self.network)
             if isinstance(actions, int)
             else ClippedAction(
-                nn.Sequential(self.network, Spread(actions.middle, actions.half)),
-                actions.low,
-                actions.high,
+                nn.Sequential(self.network, Spread(actions.middle, actions.half)), actions.low, actions.high
             )
         ).to(device)
         self._optimizer = torch.optim.AdamW(

@@ -32,12 +32,7 @@ class DQNAgent:
     """
 
     def __init__(
-        self,
-        settings: DQNSettings,
-        observation_size: int,
-        actions: int,
-        seed: int = 0,
-        device: str = "cpu",
+        self, settings: DQNSettings, observation_size: int, actions: int, seed: int = 0, device: str = "cpu"
     ) -> None:
         self.settings = settings
         self.observation_size, self.actions = observation_size, actions
@@ -106,11 +101,7 @@ class DQNAgent:
         return torch.from_numpy(observations).to(self._device)
 
     def observe(
-        self,
-        step: tuple[np.ndarray, int, float],
-        following: np.ndarray,
-        terminated: bool,
-        truncated: bool,
+        self, step: tuple[np.ndarray, int, float], following: np.ndarray, terminated: bool, truncated: bool
     ) -> None:
         """Stores one step: (observation, action, reward), and what followed."""
         observation, action, reward = step

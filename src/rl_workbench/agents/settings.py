@@ -90,8 +90,7 @@ class ReinforceSettings:
     )  # fmt: skip
     value_hidden: int = option(32, "units in each of the baseline's two layers", 1, 2**16)
     normalize_observations: bool = option(
-        False,
-        "normalise observations by their running mean and standard deviation, if no scale is known",
+        False, "normalise observations by their running mean and standard deviation, if no scale is known"
     )
     observation_scale: tuple[float, ...] = option(
         (), "divisor of each element of an observation; empty: no scaling"

@@ -83,9 +83,7 @@ def _by_policy(
         yield recorder.episode()
 
 
-def _player(
-    arguments: argparse.Namespace,
-) -> "tuple[Callable[[Any, Env], Any] | None, Env, Origin]":
+def _player(arguments: argparse.Namespace) -> "tuple[Callable[[Any, Env], Any] | None, Env, Origin]":
     """Returns what chooses actions, None for a hand, in which environment, and how that is made."""
     from rl_workbench.option import imported
     from rl_workbench.tools.policies import load_any

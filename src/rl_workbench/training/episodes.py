@@ -9,12 +9,7 @@ import numpy as np
 from rl_workbench.agents.document import PolicyGradientAgent
 from rl_workbench.agents.policy_gradient import Episode
 from rl_workbench.agents.reinforce import ReinforceAgent
-from rl_workbench.states import (
-    generator_state,
-    mark_random_states,
-    rewind_random_states,
-    set_generator,
-)
+from rl_workbench.states import generator_state, mark_random_states, rewind_random_states, set_generator
 from rl_workbench.training.checked import BEGIN_STEP, CURVES, Env
 from rl_workbench.training.environments import as_vector, succeeded
 

@@ -12,13 +12,7 @@ from typing import Any
 from file_access.locks import is_locked, locked_folder
 from rl_workbench.env_ids import as_file_name
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.storage import (
-    CONFIG_RECORD,
-    as_json,
-    check_writable,
-    read_record,
-    write_atomically,
-)
+from rl_workbench.storage import CONFIG_RECORD, as_json, check_writable, read_record, write_atomically
 
 EXTRA = "stable_baselines3"
 LIBRARIES = ("python", "numpy", "torch", "gymnasium", EXTRA)  # a training's bits depend on them

@@ -49,10 +49,7 @@ class RunOptions:
     eval_frequency: int = option(10_000, "steps between evaluations; 0: only at the end", 0, LARGEST_COUNT)
     eval_episodes: int = option(10, "greedy episodes per evaluation", 1, 10**6)
     confirm_episodes: int = option(
-        0,
-        "greedy episodes that confirm a new best policy; 0: as many as in an evaluation",
-        0,
-        10**6,
+        0, "greedy episodes that confirm a new best policy; 0: as many as in an evaluation", 0, 10**6
     )
     checkpoint_frequency: int = option(
         10_000, "steps between checkpoints; 0: only at start and end", 0, LARGEST_COUNT

@@ -123,11 +123,7 @@ class PolicyGradientTraining(Algorithm):
         return not self._is_learning
 
     def state_dict(self) -> dict[str, Any]:
-        return {
-            "agent": self._agent.state_dict(),
-            "episodes": self._episodes,
-            "stride": self._stride,
-        }
+        return {"agent": self._agent.state_dict(), "episodes": self._episodes, "stride": self._stride}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         with fitting("agent"):

@@ -37,11 +37,7 @@ class ScalarLog:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        settings: dict[str, object],
-        length: int = 0,
-        say: Callable[[str], None] = print,
+        self, folder: Path, settings: dict[str, object], length: int = 0, say: Callable[[str], None] = print
     ) -> None:
         path = folder / SCALARS
         points = _truncated(path, length, say) if length else []

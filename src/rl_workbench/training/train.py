@@ -261,11 +261,7 @@ def _of(options: Options, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _parser(
-    kind: AlgorithmKind,
-    options: Options,
-    prog: str,
-    env_id: str,
-    parents: Sequence[argparse.ArgumentParser],
+    kind: AlgorithmKind, options: Options, prog: str, env_id: str, parents: Sequence[argparse.ArgumentParser]
 ) -> argparse.ArgumentParser:
     about = DESCRIPTION.format(about=kind.about, config=kind.config)
     parser = new_parser(prog, description=about, parents=parents)

@@ -25,20 +25,8 @@ from rl_workbench.training.callbacks import (
     EvaluationResult,
     ScalarLogger,
 )
-from rl_workbench.training.checkpoints import (
-    BEST,
-    Checkpoints,
-    candidates,
-    fitting,
-    read,
-    read_newest,
-)
-from rl_workbench.training.environments import (
-    close_all,
-    robot_options,
-    source_digest,
-    training_environments,
-)
+from rl_workbench.training.checkpoints import BEST, Checkpoints, candidates, fitting, read, read_newest
+from rl_workbench.training.environments import close_all, robot_options, source_digest, training_environments
 from rl_workbench.training.evaluator import Evaluation, Evaluator
 from rl_workbench.training.history import History, Outcome, evaluation_of
 from rl_workbench.training.options import TrainingOptions
@@ -58,11 +46,7 @@ class Training:
     log: ScalarLog
 
     def __init__(
-        self,
-        options: TrainingOptions,
-        folder: Path,
-        interrupt: Interrupt,
-        callbacks: Sequence[Callback] = (),
+        self, options: TrainingOptions, folder: Path, interrupt: Interrupt, callbacks: Sequence[Callback] = ()
     ) -> None:
         check_device(options.run.device)
         torch.set_num_threads(1)  # for networks this small more threads are slower

@@ -13,15 +13,7 @@ from robot_envs.errors import RobotEnvError
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask, Task, Unrewarded
-from robot_envs.world_state import (
-    ODOMETRY,
-    Command,
-    JointState,
-    Models,
-    Sensors,
-    StateQuery,
-    WorldState,
-)
+from robot_envs.world_state import ODOMETRY, Command, JointState, Models, Sensors, StateQuery, WorldState
 from robot_sim.control.joint import JointLimits
 
 

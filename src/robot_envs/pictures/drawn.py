@@ -108,10 +108,7 @@ class DrawnEnv(gymnasium.Env[Any, Any]):
         """Checks the options; see `RobotEnv`. The period is that of control [s]."""
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f'render_mode is "human" or "rgb_array", not {render_mode!r}')
-        self.metadata = {
-            "render_modes": list(RENDER_MODES),
-            "render_fps": max(1, round(1.0 / period)),
-        }
+        self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": max(1, round(1.0 / period))}
         self.render_mode = render_mode
         self._picture = RobotPicture(
             self.scene.robots[0],

@@ -93,10 +93,7 @@ class Placement:
     """A robot on a ground at z = 0, or above it, with its surroundings; `base` is its root link's pose."""
 
     def __init__(
-        self,
-        robot: Robot,
-        base: Callable[[], Pose] | None = None,
-        beside: Surroundings | None = None,
+        self, robot: Robot, base: Callable[[], Pose] | None = None, beside: Surroundings | None = None
     ) -> None:
         self._beside = beside
         self.name, self.description = robot.model, robot.links

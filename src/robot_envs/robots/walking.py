@@ -13,15 +13,7 @@ from robot_envs.robot import Robot
 from robot_envs.robots import actions, numbers
 from robot_envs.robots.gait import Gait
 from robot_envs.task import Task
-from robot_envs.world_state import (
-    Commands,
-    InitialState,
-    Motion,
-    Push,
-    StateQuery,
-    Twist,
-    WorldState,
-)
+from robot_envs.world_state import Commands, InitialState, Motion, Push, StateQuery, Twist, WorldState
 from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate, to_rpy
 
 DOWN = (0.0, 0.0, -1.0)

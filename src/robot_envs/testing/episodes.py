@@ -12,15 +12,7 @@ from robot_envs.backends import make_backend
 from robot_envs.robot import Robot
 from robot_envs.scene import Scene
 from robot_envs.task import GoalTask
-from robot_envs.testing.rollouts import (
-    Subject,
-    differences,
-    expect_error,
-    numbers,
-    outside,
-    rollout,
-    same,
-)
+from robot_envs.testing.rollouts import Subject, differences, expect_error, numbers, outside, rollout, same
 from robot_envs.world_state import InitialState, LinkQuery, StateQuery, WorldState
 from robot_sim.physics.pose import conjugate, rotate
 
@@ -127,9 +119,7 @@ def beginnings(subject: Subject) -> None:
         expect_error(lambda: env.step(action), first, gymnasium.error.ResetNeeded)
         unknown = {"no_such_option": 1}
         expect_error(
-            lambda: env.reset(options=unknown),
-            "reset() with an option that doesn't exist",
-            ValueError,
+            lambda: env.reset(options=unknown), "reset() with an option that doesn't exist", ValueError
         )
         begin = {"initial_state": InitialState()}
         states = []

@@ -85,14 +85,7 @@ _AXES = {  # of a length: index, the moments that scale with its square, the pro
     "y": (1, ("ixx", "izz"), ("ixy", "iyz")),
     "z": (2, ("ixx", "iyy"), ("ixz", "iyz")),
 }
-_ENTRIES = {
-    "ixx": (0, 0),
-    "ixy": (0, 1),
-    "ixz": (0, 2),
-    "iyy": (1, 1),
-    "iyz": (1, 2),
-    "izz": (2, 2),
-}
+_ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
 def length_axis(inertia: Inertia) -> str:

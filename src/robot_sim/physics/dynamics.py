@@ -42,11 +42,7 @@ def _about(body: Inertia, point: np.ndarray) -> np.ndarray:
 def _tensor(body: Inertia) -> np.ndarray:
     """Returns the tensor (3, 3) about the centre of mass, in the axes of `com`."""
     return np.array(
-        [
-            [body.ixx, body.ixy, body.ixz],
-            [body.ixy, body.iyy, body.iyz],
-            [body.ixz, body.iyz, body.izz],
-        ]
+        [[body.ixx, body.ixy, body.ixz], [body.ixy, body.iyy, body.iyz], [body.ixz, body.iyz, body.izz]]
     )
 
 
@@ -106,9 +102,7 @@ def effective_inertias(model: ModelDescription, poses: Mapping[str, Pose]) -> di
 
 
 def mobility(
-    model: ModelDescription,
-    poses: Mapping[str, Pose],
-    added: Mapping[str, float] = MappingProxyType({}),
+    model: ModelDescription, poses: Mapping[str, Pose], added: Mapping[str, float] = MappingProxyType({})
 ) -> np.ndarray:
     """Returns the accelerations of the movable joints for unit efforts: the inverse mass matrix (n, n).
 

@@ -10,14 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from robot_sim.physics.description import (
-    DescriptionError,
-    Inertia,
-    Joint,
-    Link,
-    ModelDescription,
-    Shape,
-)
+from robot_sim.physics.description import DescriptionError, Inertia, Joint, Link, ModelDescription, Shape
 from robot_sim.physics.dynamics import combine, is_positive_definite
 from robot_sim.physics.pose import Pose
 

@@ -4,17 +4,7 @@ from math import hypot
 
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
-from robot_sim.physics.pose import (
-    ZERO,
-    Pose,
-    Vector,
-    add,
-    conjugate,
-    cross,
-    rotate,
-    scale,
-    subtract,
-)
+from robot_sim.physics.pose import ZERO, Pose, Vector, add, conjugate, cross, rotate, scale, subtract
 
 SLOWEST = 0.01  # [m/s, rad/s]; ODE lets no slower velocity decay
 

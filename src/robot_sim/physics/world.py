@@ -6,14 +6,7 @@ from typing import Any
 
 from robot_sim.physics import passive_forces
 from robot_sim.physics.actor import Actor
-from robot_sim.physics.description import (
-    DescriptionError,
-    Inertia,
-    Light,
-    Link,
-    ModelDescription,
-    Shape,
-)
+from robot_sim.physics.description import DescriptionError, Inertia, Light, Link, ModelDescription, Shape
 from robot_sim.physics.engine import Body, Contact, Engine, EngineSettings, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model

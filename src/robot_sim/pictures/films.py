@@ -95,10 +95,7 @@ def write_picture(options: RecordingOptions, frames: Frames) -> None:
         Image.fromarray(picture).save(file, "PNG")
 
 
-FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {
-    ".mp4": write_video,
-    ".png": write_picture,
-}
+FILMS: dict[str, Callable[[RecordingOptions, Frames], None]] = {".mp4": write_video, ".png": write_picture}
 
 
 def main() -> int:

@@ -14,15 +14,7 @@ from robot_sim.physics.files.elements import shown
 from robot_sim.physics.files.meshes import read_look
 from robot_sim.physics.pose import Pose, Vector, rotate, z_onto
 from robot_sim.pictures.camera import TILES
-from robot_sim.pictures.page_batches import (
-    Appearance,
-    Batches,
-    Geometry,
-    GlbFile,
-    Instance,
-    Singles,
-    Where,
-)
+from robot_sim.pictures.page_batches import Appearance, Batches, Geometry, GlbFile, Instance, Singles, Where
 from robot_sim.pictures.visuals import GREY, ROUNDS, SIDES
 
 COLLISION = (1.0, 0.5, 0.0, 0.35)
@@ -160,11 +152,7 @@ def _cylinder() -> Geometry:
 
 
 # Each solid, and which of its shape's sizes are its factors along x, y and z.
-SOLIDS = {
-    "box": (_box, (0, 1, 2)),
-    "cylinder": (_cylinder, (0, 0, 1)),
-    "sphere": (_ball, (0, 0, 0)),
-}
+SOLIDS = {"box": (_box, (0, 1, 2)), "cylinder": (_cylinder, (0, 0, 1)), "sphere": (_ball, (0, 0, 0))}
 
 
 def _geometry(vertices: np.ndarray, faces: np.ndarray, **look: Any) -> Geometry:

@@ -7,14 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_sim.physics.description import (
-    Color,
-    DescriptionError,
-    Joint,
-    Link,
-    ModelDescription,
-    Shape,
-)
+from robot_sim.physics.description import Color, DescriptionError, Joint, Link, ModelDescription, Shape
 from robot_sim.physics.files.meshes import read_look
 from robot_sim.physics.pose import Pose, rotate
 

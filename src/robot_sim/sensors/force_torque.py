@@ -63,10 +63,7 @@ class LinkForces(Stateful):
         pushes = [
             _moved(centre, wrench)
             for link, (_, centre) in inertias.items()
-            for wrench in (
-                applied.wrench_on(self._model, link, now),
-                decay_wrench(self._model, link),
-            )
+            for wrench in (applied.wrench_on(self._model, link, now), decay_wrench(self._model, link))
         ]
         momentum = _sum(self._momentum(link, *each) for link, each in inertias.items())
         effort = applied.effort_on(self._model, self._joint, now)

@@ -15,14 +15,7 @@ from robot_sim.sensors.frames import frames
 from robot_sim.sensors.noise import Noise, read_noise
 from robot_sim.sensors.rays import RayScene
 from robot_sim.sensors.scene import FURTHEST
-from robot_sim.sensors.sensing import (
-    Field,
-    Measurement,
-    Mount,
-    sensor_of,
-    sensor_pose,
-    slower,
-)
+from robot_sim.sensors.sensing import Field, Measurement, Mount, sensor_of, sensor_pose, slower
 
 KINDS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 RENDERED = ("gpu_ray", "gpu_lidar")  # they see visuals, the others collisions
@@ -99,10 +92,7 @@ class Laser:
         directions = np.einsum("ij,kj->ki", turns[0], self._rays)
         hits = scene.cast(places[0], directions, self.low, self.high)
         shape = self.vertical.samples, self.horizontal.samples
-        ranges, intensities = (
-            hits.distances.reshape(shape),
-            scene.retro[hits.targets].reshape(shape),
-        )
+        ranges, intensities = (hits.distances.reshape(shape), scene.retro[hits.targets].reshape(shape))
         for axis, fan in enumerate((self.vertical, self.horizontal)):
             ranges, intensities = (_resampled(each, fan, axis) for each in (ranges, intensities))
         beyond, before = ranges >= self.high, ranges <= self.low

@@ -137,10 +137,7 @@ class RayCaster:
         tangents = np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)), -np.inf)
         least = (tangents - MARGIN * (1.0 + np.abs(tangents))).astype(np.float32)
         least[tangents > far] = np.inf
-        (x, y, z), (dx, dy, dz) = (
-            ways.astype(np.float32).T[..., None],
-            directions.astype(np.float32).T,
-        )
+        (x, y, z), (dx, dy, dz) = (ways.astype(np.float32).T[..., None], directions.astype(np.float32).T)
         along = x * dx
         along += y * dy
         along += z * dz

@@ -92,12 +92,7 @@ class Schedule(Shared, Stateful):
         sim.parts["schedule"] = self
 
     def begin(
-        self,
-        model: Model,
-        rate: float,
-        measure: Measure,
-        listens: Callable[[], bool],
-        at_once: bool = True,
+        self, model: Model, rate: float, measure: Measure, listens: Callable[[], bool], at_once: bool = True
     ) -> SensorClock:
         """Returns a clock that calls `measure` with the time [ns]; the caller holds the simulator's lock.
 

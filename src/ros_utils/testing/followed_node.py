@@ -91,13 +91,7 @@ class FollowedNode:
     """
 
     def __init__(
-        self,
-        name: str,
-        package: str,
-        executable: str,
-        args: Sequence[str],
-        hears: str,
-        commands: str,
+        self, name: str, package: str, executable: str, args: Sequence[str], hears: str, commands: str
     ) -> None:
         self.controller = commands.rpartition("/")[0] or commands
         self.name, self._hears, self._waiting = f"/{name}", hears, 0

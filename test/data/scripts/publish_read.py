@@ -35,10 +35,7 @@ ros_node.ros_node_from_pkg(
     args="joint_state_controller stand_cart_position_controller",
 )
 ros_node.ros_node_from_pkg(
-    "joint_state_publisher",
-    "joint_state_publisher",
-    launch_new_term=False,
-    name="joint_state_publisher",
+    "joint_state_publisher", "joint_state_publisher", launch_new_term=False, name="joint_state_publisher"
 )
 command = rospy.Publisher("/stand_cart_position_controller/command", Float64, queue_size=1)
 rospy.Subscriber("/joint_states", JointState, on_state)

@@ -66,10 +66,7 @@ class SecondRobot(unittest.TestCase):
 @unittest.skipIf(REALTIME, "time runs by itself")
 class Lockstep(SecondRobot):
     def test_the_bits_are_those_of_the_robot_in_process(self):
-        for options in (
-            {},
-            {"varied": True, "sensor_noise": {"hinge": (0.01, 0.1)}, "sensor_delay": 2},
-        ):
+        for options in ({}, {"varied": True, "sensor_noise": {"hinge": (0.01, 0.1)}, "sensor_delay": 2}):
             runs = []
             for backend in ("ros", "bullet"):
                 env = make_pendulum(backend, self.scene.robots[0], **options)

@@ -34,10 +34,7 @@ class Seeing(unittest.TestCase):
             self.assertEqual(list(wanted[0][1]["sensors"]), list(NAMES))
             self.assertEqual(differences(rollout(over_ros, MEASUREMENTS // 2, seed), wanted), "")
             if not scans:
-                for topic, kind, found in (
-                    ("scan", LaserScan, scans),
-                    ("eye/image_raw", Image, images),
-                ):
+                for topic, kind, found in (("scan", LaserScan, scans), ("eye/image_raw", Image, images)):
                     listener = rospy.Subscriber(topic, kind, found.append)
                     self.addCleanup(listener.unregister)
                 timer = rospy.Timer(rospy.Duration(0.01), lambda _: busy())

@@ -10,15 +10,7 @@ from pathlib import Path
 import rospy
 import rostest
 
-from ros_utils import (
-    ros_controllers,
-    ros_gazebo,
-    ros_launch,
-    ros_node,
-    ros_params,
-    ros_spawn,
-    ros_urdf,
-)
+from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_params, ros_spawn, ros_urdf
 from ros_utils.simulation import Simulation
 
 PACKAGE = """<package format="2"><name>my_robot</name><version>0.0.1</version>

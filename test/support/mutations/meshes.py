@@ -64,11 +64,7 @@ SCENE = dae(unit="0.01", up="Y_UP").replace(
     b"<scale>1 2 3</scale><translate>0 0 1</translate>"
     b'<node id="inner"><instance_geometry url="#g"/></node>',
 )
-TEXTS = {
-    ".stl": (ascii_stl(),),
-    ".obj": (obj(), OBJECTS),
-    ".dae": (dae(), polylist(), library(), SCENE),
-}
+TEXTS = {".stl": (ascii_stl(),), ".obj": (obj(), OBJECTS), ".dae": (dae(), polylist(), library(), SCENE)}
 
 
 @st.composite

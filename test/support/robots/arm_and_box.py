@@ -55,10 +55,7 @@ class ArmAndBox:
         world.spawn("box", parse_urdf(BOX), Pose((1.0, 0.0, 0.1)))
 
     def reset(
-        self,
-        joints: Mapping[str, tuple[float, float]] = START,
-        pose: Pose = DROPPED,
-        twist: Twist = THROWN,
+        self, joints: Mapping[str, tuple[float, float]] = START, pose: Pose = DROPPED, twist: Twist = THROWN
     ) -> None:
         """Begins an episode."""
         self.sim.reset(everything=False)

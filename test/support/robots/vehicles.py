@@ -24,13 +24,7 @@ def wheel(name: str, place: str, parent: str = "base", interface: str = "Velocit
 
 
 def _joint(
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    place: str,
-    axis: str = "0 0 1",
-    speed: float = 1.0,
+    name: str, kind: str, parent: str, child: str, place: str, axis: str = "0 0 1", speed: float = 1.0
 ) -> str:
     return f"""<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
       <origin xyz="{place}"/><axis xyz="{axis}"/>

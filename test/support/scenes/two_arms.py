@@ -110,11 +110,7 @@ class Volley(Task):
     max_steps = 60
     query = StateQuery(
         models=("ball", "plinth", "left"),
-        links=(
-            LinkQuery("left::tip"),
-            LinkQuery("right::tip", "left::tip"),
-            LinkQuery("ball::rubber"),
-        ),
+        links=(LinkQuery("left::tip"), LinkQuery("right::tip", "left::tip"), LinkQuery("ball::rubber")),
         contacts_of=("ball",),
     )
 
@@ -146,11 +142,7 @@ class Volley(Task):
 
     def apply(self, action: np.ndarray, state: WorldState) -> Commands:
         elbow, shoulder, lift, swing = action.tolist()
-        return {
-            "/left/pair": (elbow, shoulder),
-            "/right/lift": 1.5 * lift,
-            "/right/swing": 3.0 * swing,
-        }
+        return {"/left/pair": (elbow, shoulder), "/right/lift": 1.5 * lift, "/right/swing": 3.0 * swing}
 
     def observe(self, state: WorldState) -> np.ndarray:
         joints = [number for each in state.joints.values() for number in each]

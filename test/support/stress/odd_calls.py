@@ -18,12 +18,7 @@ import rosgraph
 import rospy
 import rosservice
 import rostopic
-from gazebo_msgs.srv import (
-    GetPhysicsProperties,
-    GetWorldProperties,
-    SetPhysicsProperties,
-    SpawnModel,
-)
+from gazebo_msgs.srv import GetPhysicsProperties, GetWorldProperties, SetPhysicsProperties, SpawnModel
 from geometry_msgs.msg import Point, Pose
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st

@@ -98,10 +98,7 @@ class World:
 
     def usage_again(self, before: Usage) -> Usage:
         """The same, once connections that just closed are gone: no more of anything, but for memory."""
-        waits(
-            lambda: all(now <= old for now, old in zip(self.usage()[1:], before[1:], strict=True)),
-            30,
-        )
+        waits(lambda: all(now <= old for now, old in zip(self.usage()[1:], before[1:], strict=True)), 30)
         return self.usage()
 
     def is_alive(self) -> bool:

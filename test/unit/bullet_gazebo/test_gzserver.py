@@ -73,8 +73,7 @@ BOUND = 60.0  # [s]
 
 
 @pytest.mark.parametrize(
-    ("line", "name"),
-    [("", "/gazebo"), ("__name:=world -u", "/world"), ("__ns:=/second", "/second/gazebo")],
+    ("line", "name"), [("", "/gazebo"), ("__name:=world -u", "/world"), ("__ns:=/second", "/second/gazebo")]
 )
 def test_the_name_is_the_command_lines(line, name, monkeypatch) -> None:
     monkeypatch.delenv("ROS_NAMESPACE", raising=False)

@@ -18,12 +18,7 @@ from rospy.impl.tcpros_base import TCPROSTransportProtocol, TCPServer
 from std_msgs.msg import String
 
 from bullet_gazebo.common import rospy_connections as connections
-from bullet_gazebo.common.rospy_connections import (
-    LARGEST_HEADER,
-    LARGEST_MESSAGE,
-    Reception,
-    bound_messages,
-)
+from bullet_gazebo.common.rospy_connections import LARGEST_HEADER, LARGEST_MESSAGE, Reception, bound_messages
 
 BOUND = 60.0  # [s]
 LOOPBACK = "127.0.0.1"

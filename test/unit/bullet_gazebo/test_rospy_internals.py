@@ -18,11 +18,7 @@ from rospy.topics import _PublisherImpl, _TopicImpl
 from std_msgs.msg import String
 
 from bullet_gazebo.common import rospy_internals
-from bullet_gazebo.common.rospy_internals import (
-    free_polls_at_once,
-    registered_together,
-    wait_until_sent,
-)
+from bullet_gazebo.common.rospy_internals import free_polls_at_once, registered_together, wait_until_sent
 
 
 class SlowTransport:

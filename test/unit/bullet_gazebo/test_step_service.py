@@ -101,10 +101,7 @@ def test_of_several_robots_plain_names_are_refused_and_full_ones_taken(world):
         assert f" have a {kind} '" in answer.status_message
     joints = world.step(1, **full[0], **full[1], **full[2])
     assert len(joints) == 12
-    assert [name for name, state in joints.items() if state[2]] == [
-        "left::effort_b",
-        "right::effort_a",
-    ]
+    assert [name for name, state in joints.items() if state[2]] == ["left::effort_b", "right::effort_a"]
     assert joints["right::velocity_b"][0] == pytest.approx(0.5)
     assert joints["left::velocity_b"][0] == 0.0
 

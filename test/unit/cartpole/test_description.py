@@ -14,16 +14,10 @@ FIGURES = {  # mass [kg], height of the centre of mass [m], ixx, iyy, izz [kg mÂ
 JOINTS = {  # type, parent, child, origin [m], axis; lower, upper [m, rad], effort [N, N m], velocity
     "grounding": ("fixed", "world", "stand", "0 0 0", None, None),
     "stand_cart": ("prismatic", "stand", "cart", "0 0 0.150", "1 0 0", (-0.5, 0.5, 30.0, 7.0)),
-    "cart_pole": (
-        *("continuous", "cart", "pole", "0 0 0.030", "0 -1 0"),
-        (-0.785398, 0.785398, 30.0, 7.0),
-    ),
+    "cart_pole": (*("continuous", "cart", "pole", "0 0 0.030", "0 -1 0"), (-0.785398, 0.785398, 30.0, 7.0)),
 }
 FILES = ["urdf/cartpole.urdf.xacro", "companions/cartpole_gazebo/robots/cartpole_v1.urdf"]
-CONTROLLER = {
-    "type": "effort_controllers/JointPositionController",
-    "pid": {"p": 100.0, "i": 0.01, "d": 10.0},
-}
+CONTROLLER = {"type": "effort_controllers/JointPositionController", "pid": {"p": 100.0, "i": 0.01, "d": 10.0}}
 
 
 @pytest.fixture(scope="module")

@@ -40,12 +40,7 @@ def test_a_training_is_logged(
     tracker = Tracker(name)
     monkeypatch.setitem(sys.modules, name, tracker)
     callback = getattr(imported(f"{name}_callback"), example)()
-    short = {
-        "total_timesteps": 300,
-        "eval_frequency": 150,
-        "eval_episodes": 1,
-        "confirm_episodes": 1,
-    }
+    short = {"total_timesteps": 300, "eval_frequency": 150, "eval_episodes": 1, "confirm_episodes": 1}
     robot = {"env_id": "CartPole-v1", "learning_starts": 50, "run_dir": tmp_path / "run"}
     train("dqn", callbacks=[callback], **robot, **short)
     names = [call[0] for call in tracker.calls]

@@ -3,18 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from support.robots.new_robots import (
-    BARE,
-    FIXED,
-    JOINT,
-    LIMIT,
-    LINK,
-    MOTOR,
-    NOBODYS,
-    PLUGIN,
-    SWING,
-    robot,
-)
+from support.robots.new_robots import BARE, FIXED, JOINT, LIMIT, LINK, MOTOR, NOBODYS, PLUGIN, SWING, robot
 from support.robots.vehicles import two_wheels
 
 from package_writing.cli import main

@@ -10,15 +10,7 @@ from pathlib import Path
 
 import pytest
 
-LIBRARIES = (
-    "bullet_gazebo",
-    "cartpole",
-    "rl_workbench",
-    "robot_envs",
-    "robot_sim",
-    "ros_calls",
-    "ros_utils",
-)
+LIBRARIES = ("bullet_gazebo", "cartpole", "rl_workbench", "robot_envs", "robot_sim", "ros_calls", "ros_utils")
 IMPORT = re.compile(rf"^ *from ((?:{'|'.join(LIBRARIES)})[\w.]*) import ([\w, ]+)$", re.MULTILINE)
 NOT_FOR_USERS = ("docs/architecture.md",)
 # Their classes are named by other names: controllers' types, ids of environments.

@@ -175,8 +175,7 @@ def test_missing_packages_are_one_line(
     assert (ended.returncode, ended.stdout) == (1, "")
     (line,) = ended.stderr.splitlines()
     told = re.fullmatch(
-        rf"{program}: Python packages are missing \((.*)\); what installs them: (.*) \(see .*\)",
-        line,
+        rf"{program}: Python packages are missing \((.*)\); what installs them: (.*) \(see .*\)", line
     )
     assert set(missing.split(", ")) <= set(told[1].split(", "))
     python, *arguments, file = shlex.split(told[2])

@@ -48,10 +48,7 @@ def start(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [
-        *((name, signal.SIGINT) for name in PROGRAMS),
-        ("node.gzserver main_with_window", signal.SIGTERM),
-    ],
+    [*((name, signal.SIGINT) for name in PROGRAMS), ("node.gzserver main_with_window", signal.SIGTERM)],
 )
 def test_a_signal_in_the_middle_of_a_registration_ends_it(start, name, number):
     with socket.create_server(("127.0.0.1", 0)) as mute_master:

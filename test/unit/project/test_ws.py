@@ -187,8 +187,7 @@ def test_roscore_is_the_master_that_the_workspace_looks_for(ws, root, tmp_path):
         probe.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{probe.getsockname()[1]}"
     process = subprocess.Popen(
-        [root / "ws", "roscore"],
-        env={**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(tmp_path)},
+        [root / "ws", "roscore"], env={**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(tmp_path)}
     )
     try:
         deadline = time.monotonic() + 120.0

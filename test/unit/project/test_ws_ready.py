@@ -109,8 +109,7 @@ def test_the_plan_comes_first_and_a_second_call_goes_on(ws, checkout, debian):
     told = "\n".join(lines(second))
     assert "[1/4] Debian packages: done in " in told
     assert re.search(
-        r"\[2/4\] Python packages: failed after \d+ s \(exit code 1\): ERROR: .*no-such-folder",
-        told,
+        r"\[2/4\] Python packages: failed after \d+ s \(exit code 1\): ERROR: .*no-such-folder", told
     )
     assert "; its disk has 3 MB left\n" in told
 

@@ -35,8 +35,7 @@ def begun(identifier, backend):
 
 @pytest.mark.extras("mujoco")
 @pytest.mark.parametrize(
-    ("identifier", "backend"),
-    [("robot_envs/PickCube-v0", "mujoco"), ("robot_envs/Navigate-v0", "bullet")],
+    ("identifier", "backend"), [("robot_envs/PickCube-v0", "mujoco"), ("robot_envs/Navigate-v0", "bullet")]
 )
 def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
     env = begun(identifier, backend)

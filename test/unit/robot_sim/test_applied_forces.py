@@ -5,13 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from robot_sim.applied_forces import (
-    ActingTime,
-    AppliedEffort,
-    AppliedForces,
-    AppliedWrench,
-    in_world,
-)
+from robot_sim.applied_forces import ActingTime, AppliedEffort, AppliedForces, AppliedWrench, in_world
 from robot_sim.physics.pose import Pose
 
 TICK = 1_000_000  # [ns]

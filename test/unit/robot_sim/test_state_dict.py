@@ -14,16 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from robot_sim.plain_data import pack, unpack
-from robot_sim.state_dict import (
-    Held,
-    Shared,
-    StateError,
-    Stateful,
-    attributes_of,
-    load,
-    state_of,
-    undoable,
-)
+from robot_sim.state_dict import Held, Shared, StateError, Stateful, attributes_of, load, state_of, undoable
 
 
 class Part(Stateful):
@@ -118,8 +109,7 @@ def test_parts_stay_the_same_objects_and_what_is_shared_is_left():
 
 
 @pytest.mark.parametrize(
-    "hold",
-    [lambda each: each, lambda *each: [*each], lambda *each: deque(each), lambda a: {"a": a}],
+    "hold", [lambda each: each, lambda *each: [*each], lambda *each: deque(each), lambda a: {"a": a}]
 )
 def test_a_part_that_is_no_longer_there_is_named_and_never_becomes_plain_data(hold):
     inner = Part(x=1)

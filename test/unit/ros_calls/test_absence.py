@@ -20,11 +20,7 @@ LOCKSTEP = "roslaunch gazebo_ros empty_world.launch lockstep:=true"
         ("/sim/set_link_friction", "", f"; start one with: {LOCKSTEP}"),
         ("/gazebo/set_link_properties", "", "no simulator runs at"),
         (WORLD, "", "start one with: roslaunch gazebo_ros empty_world.launch"),
-        (
-            "/controller_manager/list_controllers",
-            WORLD,
-            "no controller manager in the namespace /:",
-        ),
+        ("/controller_manager/list_controllers", WORLD, "no controller manager in the namespace /:"),
         ("/arm/controller_manager/list_controllers", "", "is the parameter /arm/robot_description"),
         ("/fake/set", WORLD, "no node offers this service"),
     ],

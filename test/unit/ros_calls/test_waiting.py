@@ -12,13 +12,7 @@ from support.ros.ros_fakes import FakeService
 
 from ros_calls import master as ros_master
 from ros_calls.service import ServiceMissing
-from ros_calls.waiting import (
-    service_answers,
-    service_comes_up,
-    wait_and_call,
-    wait_for_service,
-    wait_until,
-)
+from ros_calls.waiting import service_answers, service_comes_up, wait_and_call, wait_for_service, wait_until
 
 NAME = "/fake/set"
 LIMIT = 0.3  # [s] of a wait in vain

@@ -114,12 +114,7 @@ def test_a_failure_leaves_its_recording_and_seed(tmp_path):
     (tmp_path / "test_cart.py").write_text(FAILING)
     place = tmp_path / "failures"
     done = run(
-        tmp_path,
-        "-m",
-        "pytest",
-        "test_cart.py",
-        ROS_TEST_FAILURES=str(place),
-        CARTPOLE_WITH="/a b:/c",
+        tmp_path, "-m", "pytest", "test_cart.py", ROS_TEST_FAILURES=str(place), CARTPOLE_WITH="/a b:/c"
     )
     assert "3 failed" in done.stdout
     assert done.stdout.count("isn't repeatable") == 1

@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_utils import (
-    ros_controllers,
-    ros_gazebo,
-    ros_launch,
-    ros_node,
-    ros_params,
-    ros_spawn,
-    ros_urdf,
-)
+from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_params, ros_spawn, ros_urdf
 from ros_utils._internal.gazebo import launch as _gazebo_launch
 
 

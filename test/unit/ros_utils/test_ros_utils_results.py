@@ -7,15 +7,7 @@ import re
 import pytest
 from geometry_msgs.msg import Pose
 
-from ros_utils import (
-    ros_controllers,
-    ros_gazebo,
-    ros_launch,
-    ros_node,
-    ros_params,
-    ros_spawn,
-    ros_urdf,
-)
+from ros_utils import ros_controllers, ros_gazebo, ros_launch, ros_node, ros_params, ros_spawn, ros_urdf
 
 MODULES = (ros_controllers, ros_gazebo, ros_launch, ros_node, ros_params, ros_spawn, ros_urdf)
 FUNCTIONS = {

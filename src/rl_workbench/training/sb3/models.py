@@ -19,13 +19,7 @@ from stable_baselines3.common.type_aliases import RolloutReturn
 from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import nn
 
-from rl_workbench.agents.greedy import (
-    ClippedAction,
-    Continuous,
-    SeveralChoices,
-    SingleChoice,
-    Switches,
-)
+from rl_workbench.agents.greedy import ClippedAction, Continuous, SeveralChoices, SingleChoice, Switches
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.option import imported
 from rl_workbench.training.algorithm import Policy

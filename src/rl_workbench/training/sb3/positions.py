@@ -11,12 +11,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.preprocessing import maybe_transpose
 
-from rl_workbench.states import (
-    generator_state,
-    mark_random_states,
-    rewind_random_states,
-    set_generator,
-)
+from rl_workbench.states import generator_state, mark_random_states, rewind_random_states, set_generator
 from rl_workbench.training.repeatable import EpisodeMark, RepeatableEnvironment
 
 ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts",

@@ -164,10 +164,7 @@ class LockstepWorld(RobotBackend):
     def _state(self, answer: StepAnswer) -> WorldState:
         numbers, count = answer.numbers, len(answer.joints)
         joints = self._read.read(
-            answer.joints,
-            numbers[:count],
-            numbers[count : 2 * count],
-            numbers[2 * count : 3 * count],
+            answer.joints, numbers[:count], numbers[count : 2 * count], numbers[2 * count : 3 * count]
         )
         time = (answer.now - self._begun) / 1e9  # [s]
         if len(numbers) == 3 * count and not answer.contacts and not answer.sensors:

@@ -70,11 +70,7 @@ class SensorListener:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        names: Sequence[str],
-        clock: Callable[[], float],
-        off: float | None = None,
+        self, robot: Robot, names: Sequence[str], clock: Callable[[], float], off: float | None = None
     ) -> None:
         self._clock, self._off = clock, off
         self._arrived = threading.Condition()

@@ -64,14 +64,7 @@ class Controller(Stateful, ABC):
     docs/controllers.md explains how to write one.
     """
 
-    non_persistent: ClassVar[tuple[str, ...]] = (
-        "name",
-        "state",
-        "claimed",
-        "inputs",
-        "outputs",
-        "loops",
-    )
+    non_persistent: ClassVar[tuple[str, ...]] = ("name", "state", "claimed", "inputs", "outputs", "loops")
     type_name: ClassVar[str]
     interface: ClassVar[str]
     parameters: ClassVar[Sequence[type[Parameters]]] = ()  # that `create` reads

@@ -8,14 +8,7 @@ from typing import Self
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Output
-from robot_sim.control.controllers.parameters import (
-    SLOWEST,
-    Parameters,
-    SomeJoints,
-    parameter,
-    rate,
-    truth,
-)
+from robot_sim.control.controllers.parameters import SLOWEST, Parameters, SomeJoints, parameter, rate, truth
 from robot_sim.control.hardware import EFFORT, POSITION, VELOCITY, RobotHardware
 from robot_sim.control.pid import Loop, Pid
 from robot_sim.control.trajectory import Axis, State
@@ -88,11 +81,7 @@ class JointTrajectoryController(Controller):
     non_persistent = ("_goal", "_settings", "_monitored", "_state_period")
 
     def __init__(
-        self,
-        name: str,
-        axes: list[Axis],
-        settings: TrajectoryParameters,
-        tolerances: list[JointTolerances],
+        self, name: str, axes: list[Axis], settings: TrajectoryParameters, tolerances: list[JointTolerances]
     ) -> None:
         super().__init__(name)
         self.joint_names = tuple(axis.joint.name for axis in axes)

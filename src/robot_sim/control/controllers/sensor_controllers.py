@@ -86,8 +86,5 @@ class ForceTorqueSensorController(SensorController):
 
 CONTROLLERS = {
     "imu_sensor_controller/ImuSensorController": (ImuSensorController, IMU),
-    "force_torque_sensor_controller/ForceTorqueSensorController": (
-        ForceTorqueSensorController,
-        FORCE_TORQUE,
-    ),
+    "force_torque_sensor_controller/ForceTorqueSensorController": (ForceTorqueSensorController, FORCE_TORQUE),
 }

@@ -9,13 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple, Self
 
 from robot_sim.control.controllers.base import Input, Output
-from robot_sim.control.controllers.parameters import (
-    number,
-    parameter,
-    positive,
-    reader,
-    wheel_names,
-)
+from robot_sim.control.controllers.parameters import number, parameter, positive, reader, wheel_names
 from robot_sim.control.controllers.vehicle import VehicleController, VehicleParameters
 from robot_sim.control.hardware import POSITION, VELOCITY, RobotHardware
 from robot_sim.control.joint import JointHandle
@@ -214,12 +208,6 @@ def axle_angle(left: float, right: float) -> float:
 
 
 CONTROLLERS = {
-    "ackermann_steering_controller/AckermannSteeringController": (
-        AckermannSteeringController,
-        VELOCITY,
-    ),
-    "four_wheel_steering_controller/FourWheelSteeringController": (
-        FourWheelSteeringController,
-        VELOCITY,
-    ),
+    "ackermann_steering_controller/AckermannSteeringController": (AckermannSteeringController, VELOCITY),
+    "four_wheel_steering_controller/FourWheelSteeringController": (FourWheelSteeringController, VELOCITY),
 }

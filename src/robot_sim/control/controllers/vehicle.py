@@ -7,14 +7,7 @@ from typing import Any, NamedTuple
 
 from robot_sim.constants import NANOSECONDS
 from robot_sim.control.controllers.base import Controller, Input, Output
-from robot_sim.control.controllers.parameters import (
-    Parameters,
-    length,
-    number,
-    of_type,
-    parameter,
-    reader,
-)
+from robot_sim.control.controllers.parameters import Parameters, length, number, of_type, parameter, reader
 from robot_sim.control.errors import ControlError
 from robot_sim.control.pid import is_number
 from robot_sim.drives.odometry import DeadReckoning, OdometrySample, Period, RollingMean, Triple

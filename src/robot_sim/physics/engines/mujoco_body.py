@@ -6,13 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_sim.physics.description import (
-    UNMOVED,
-    DescriptionError,
-    Inertia,
-    ModelDescription,
-    Shape,
-)
+from robot_sim.physics.description import UNMOVED, DescriptionError, Inertia, ModelDescription, Shape
 from robot_sim.physics.engine import STRONGEST, Body, Twist
 from robot_sim.physics.engines.mujoco_model import Elements, geoms_of, priority, wxyz, xyzw
 from robot_sim.physics.engines.mujoco_state import MujocoState

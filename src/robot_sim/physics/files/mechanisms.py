@@ -9,14 +9,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from xml.etree.ElementTree import Element
 
-from robot_sim.physics.description import (
-    DescriptionError,
-    Joint,
-    Mimic,
-    ModelDescription,
-    Plugin,
-    library_of,
-)
+from robot_sim.physics.description import DescriptionError, Joint, Mimic, ModelDescription, Plugin, library_of
 from robot_sim.physics.files.elements import finite, shown
 from robot_sim.physics.files.sdf_parts import value
 

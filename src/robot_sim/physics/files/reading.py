@@ -12,12 +12,7 @@ from xml.etree.ElementTree import Element
 from file_access.content import MAX_BYTES, read_file
 from file_access.xml_text import MAX_ELEMENTS, parse
 from robot_sim.physics.description import DescriptionError, LimitExceeded, Mesh, ModelDescription
-from robot_sim.physics.files.elements import (
-    files_named_by_a_model,
-    place,
-    reading_files,
-    shown,
-)
+from robot_sim.physics.files.elements import files_named_by_a_model, place, reading_files, shown
 from robot_sim.physics.files.meshes import SUFFIXES, Selection, check_mesh, in_pieces, read_mesh
 
 MeshFile = tuple[str, Mesh | None]

@@ -9,13 +9,7 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from robot_sim.constants import NANOSECONDS
-from robot_sim.physics.description import (
-    DescriptionError,
-    Joint,
-    Light,
-    ModelDescription,
-    SavedMotion,
-)
+from robot_sim.physics.description import DescriptionError, Joint, Light, ModelDescription, SavedMotion
 from robot_sim.physics.dynamics import child_pose, link_poses, poses_at_zero
 from robot_sim.physics.engine import FASTEST, Twist
 from robot_sim.physics.engine_form import FURTHEST, rigid

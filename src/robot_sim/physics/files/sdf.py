@@ -20,14 +20,7 @@ from robot_sim.physics.description import (
     Sensor,
 )
 from robot_sim.physics.files.element_table import MODEL, WithoutEffect
-from robot_sim.physics.files.elements import (
-    files_named_by_a_model,
-    named,
-    place,
-    read_plugin,
-    shown,
-    truth,
-)
+from robot_sim.physics.files.elements import files_named_by_a_model, named, place, read_plugin, shown, truth
 from robot_sim.physics.files.mechanisms import add_mechanisms
 from robot_sim.physics.files.motion import read_link_motion, settle_kinematic
 from robot_sim.physics.files.own_models import own_models
@@ -319,11 +312,7 @@ def _take_over(parts: _Parts, inner: _Parts, prefix: str) -> None:
         replace(each, scope=f"{prefix}::{each.scope}" if each.scope else prefix) for each in inner.plugins
     ]
     parts.sensors += [
-        replace(
-            each,
-            link=f"{prefix}::{each.link}",
-            joint=f"{prefix}::{each.joint}" if each.joint else "",
-        )
+        replace(each, link=f"{prefix}::{each.link}", joint=f"{prefix}::{each.joint}" if each.joint else "")
         for each in inner.sensors
     ]
     parts.warnings += inner.warnings

@@ -23,17 +23,7 @@ from robot_sim.physics.pose import Pose, Vector, conjugate, from_rpy, rotate
 MATERIALS = Path(__file__).with_name("materials.toml")
 MODEL = "__model__"
 WORLD = "world"
-KINDS = (
-    "revolute",
-    "continuous",
-    "prismatic",
-    "fixed",
-    "ball",
-    "universal",
-    "revolute2",
-    "gearbox",
-    "screw",
-)
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal", "revolute2", "gearbox", "screw")
 NO_LIMIT = 1e16  # [rad, m, N m, N, rad/s, m/s]; SDF's own figure for "none"
 JOINT_FRAME_SINCE = (1, 5)  # before that, axes were given in the model's frame
 MOMENTS = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}  # defaults

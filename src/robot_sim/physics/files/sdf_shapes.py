@@ -5,14 +5,7 @@ from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Color, DescriptionError, LimitExceeded, Shape
-from robot_sim.physics.files.elements import (
-    direction,
-    numbers,
-    place,
-    positive,
-    shown,
-    truth,
-)
+from robot_sim.physics.files.elements import direction, numbers, place, positive, shown, truth
 from robot_sim.physics.files.meshes import IMAGES, Submesh, make_mesh
 from robot_sim.physics.files.own_models import model_of_mesh
 from robot_sim.physics.files.reading import MeshFile, MeshFinder

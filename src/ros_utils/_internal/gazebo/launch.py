@@ -79,11 +79,7 @@ def launch_Gazebo(
         "gui_required": gui_required,
     }  # fmt: skip
     # A real gazebo_ros rejects unknown arguments, so only those asked for are passed.
-    asked = {
-        "lockstep": lockstep or None,
-        "seed": seed,
-        "extra_gazebo_args": extra_gazebo_args or None,
-    }
+    asked = {"lockstep": lockstep or None, "seed": seed, "extra_gazebo_args": extra_gazebo_args or None}
     arguments |= {name: value for name, value in asked.items() if value is not None}
     service = f"{gazebo_ns.rstrip('/')}/{READY}"
     answers = functools.partial(service_answers, service)

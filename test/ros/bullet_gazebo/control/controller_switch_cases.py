@@ -38,10 +38,7 @@ class SwitchTest(PausedRobot):
         wrong = {}  # rostest doesn't print what a subTest says
         before = dict.fromkeys(CONTROLLERS, "initialized") | {"cart": "running"}
         for case, (start, stop, strict_ok, strict, loose_ok, loose) in SWITCHES.items():
-            for strictness, ok, after in (
-                (STRICT, strict_ok, strict),
-                (BEST_EFFORT, loose_ok, loose),
-            ):
+            for strictness, ok, after in ((STRICT, strict_ok, strict), (BEST_EFFORT, loose_ok, loose)):
                 if self.manager.states() != before:
                     self.begin_anew()
                 found = self.manager.switch(start, stop, strictness), self.manager.states()

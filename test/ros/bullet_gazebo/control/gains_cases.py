@@ -92,10 +92,7 @@ class GainsTest(SlidesTest):
 
     def test_every_joint_of_a_group_and_every_drive_has_gains(self):
         self.run_controllers("effort_group_position")
-        for gains in (
-            "effort_group_position/effort_b/pid",
-            "gazebo_ros_control/pid_gains/velocity_b",
-        ):
+        for gains in ("effort_group_position/effort_b/pid", "gazebo_ros_control/pid_gains/velocity_b"):
             self.assertEqual(reconfigure(f"/slides/{gains}", p=111.0)["p"], 111.0)
 
     def test_they_go_with_the_controller(self):

@@ -205,10 +205,7 @@ class SpawnerTest(CartPoleCase):
         self.expect_states(RUNNING)
         unspawner = self.unspawner("cart", "__name:=my_unspawner")
         self.expect_states({"states": "running", "cart": "stopped"})
-        for program, name, states in (
-            (unspawner, "/my_unspawner", RUNNING),
-            (spawner, "/my_spawner", {}),
-        ):
+        for program, name, states in ((unspawner, "/my_unspawner", RUNNING), (spawner, "/my_spawner", {})):
             subprocess.run(["rosnode", "kill", name], check=True, stdout=subprocess.DEVNULL)
             self.ends(program)
             self.expect_states(states)

@@ -81,10 +81,7 @@ class ReplayTest(unittest.TestCase):
 
     @contextlib.contextmanager
     def simulation(self, arguments=""):
-        with (
-            Simulation(lockstep=True, extra_gazebo_args=arguments) as simulation,
-            simulation.active(),
-        ):
+        with Simulation(lockstep=True, extra_gazebo_args=arguments) as simulation, simulation.active():
             yield simulation
 
     @contextlib.contextmanager

@@ -15,15 +15,7 @@ from functools import partial
 import rospy
 import rostest
 from gazebo_msgs.msg import ModelStates
-from support.ros.calls import (
-    BOUND,
-    delete_model,
-    executable,
-    gazebo,
-    model_names,
-    position,
-    spawn_model,
-)
+from support.ros.calls import BOUND, delete_model, executable, gazebo, model_names, position, spawn_model
 from support.ros.world_case import WorldCase
 
 from ros_utils import ros_gazebo

@@ -11,15 +11,7 @@ from gazebo_physics_cases import PhysicsTest
 from stand_in_cases import StandInTest
 from surface_cases import SurfaceTest
 
-__all__ = [
-    "ForcesTest",
-    "JointsTest",
-    "LinksTest",
-    "ModelsTest",
-    "PhysicsTest",
-    "StandInTest",
-    "SurfaceTest",
-]
+__all__ = ["ForcesTest", "JointsTest", "LinksTest", "ModelsTest", "PhysicsTest", "StandInTest", "SurfaceTest"]
 
 if __name__ == "__main__":
     rospy.init_node("gazebo_services")

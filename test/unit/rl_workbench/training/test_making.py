@@ -9,12 +9,7 @@ from support.training.learning_fakes import POLE, SPOILT, Died, Still, register_
 
 from rl_workbench import errors
 from rl_workbench.errors import WorkbenchError
-from rl_workbench.training.environments import (
-    discrete_actions,
-    make_environment,
-    robot_options,
-    shares_robot,
-)
+from rl_workbench.training.environments import discrete_actions, make_environment, robot_options, shares_robot
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -1e39])

@@ -34,12 +34,7 @@ def test_products_of_a_length_grow_with_it():
 
 @pytest.mark.parametrize(
     ("place", "axis"),
-    [
-        ((0.0, 0.0, 0.5), "z"),
-        ((0.3, 0.1, 0.0), "x"),
-        ((0.0, -0.4, 0.1), "y"),
-        ((0.0, 0.0, 0.0), "z"),
-    ],
+    [((0.0, 0.0, 0.5), "z"), ((0.3, 0.1, 0.0), "x"), ((0.0, -0.4, 0.1), "y"), ((0.0, 0.0, 0.0), "z")],
 )
 def test_a_link_is_long_where_its_centre_lies(place, axis):
     assert length_axis(Inertia(1.0, Pose(place))) == axis

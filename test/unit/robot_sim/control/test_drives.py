@@ -34,11 +34,7 @@ class Lift:
         text = lift_urdf(interface, **urdf)
         self.sim = Simulator(world, lockstep=True)
         made = add_robot(self.sim, "lift", text, gains=gains, control_period=period)
-        self.model, self.manager, self.joint = (
-            made.model,
-            made.manager,
-            made.hardware.joints["rail"],
-        )
+        self.model, self.manager, self.joint = (made.model, made.manager, made.hardware.joints["rail"])
         if controller:
             start(made, {"c": {"type": controller, "joint": "rail"} | (params or {})})
 
@@ -279,10 +275,7 @@ class Bench:
 
 @pytest.mark.parametrize(("left", "right"), [(5.0, 5.0), (2.0, -2.0)])
 def test_a_robot_drives_straight_and_turns_as_fast_as_its_wheels_say(world, left, right):
-    kind, joints = (
-        "velocity_controllers/JointGroupVelocityController",
-        ["left_joint", "right_joint"],
-    )
+    kind, joints = ("velocity_controllers/JointGroupVelocityController", ["left_joint", "right_joint"])
     bench = Bench(world, two_wheels(), Pose((0.0, 0.0, RADIUS)), kind, joints)
     bench.advance(0.5, left, right)
     before = bench.robot.model.state()[0].position

@@ -184,8 +184,7 @@ def test_joints_may_come_in_another_order_and_those_that_are_not_named_go_on():
 
 
 @pytest.mark.parametrize(
-    "tolerances",
-    [{"path": {"shoulder": Tolerance(math.nan)}}, {"goal": {"x": Tolerance(0, math.nan)}}],
+    "tolerances", [{"path": {"shoulder": Tolerance(math.nan)}}, {"goal": {"x": Tolerance(0, math.nan)}}]
 )
 def test_a_tolerance_that_is_no_number_is_refused(tolerances):
     with pytest.raises(TrajectoryRefused, match="not a number") as refusal:

@@ -105,10 +105,7 @@ def test_a_stop_ramp_slows_down_and_stands_after_five_eighths_of_the_way(positio
     assert near(ramp.sample(8 + span).position, position + 0.625 * velocity * span / S, 1e3)
 
 
-@given(
-    st.lists(st.builds(Waypoint, values, values, values), min_size=1, max_size=6),
-    st.integers(0, 3 * S),
-)
+@given(st.lists(st.builds(Waypoint, values, values, values), min_size=1, max_size=6), st.integers(0, 3 * S))
 def test_a_new_track_goes_on_smoothly_from_the_old_one(points, start):
     old = JointSpline([Segment(0, Waypoint(0.0, 0.0, 0.0), 3 * S, Waypoint(1.0, 0.5, 0.0))])
     way = [(4 * S + i * S, point) for i, point in enumerate(points)]
@@ -216,20 +213,14 @@ GAINS = {"p": 400.0, "i": 400.0, "d": 20.0, "i_clamp": 20.0}
 KINDS = {
     "Effort": {"gains": dict.fromkeys(JOINTS, GAINS)},
     "Position": {},
-    "Velocity": {
-        "gains": dict.fromkeys(JOINTS, {"p": 50.0}),
-        "velocity_ff": dict.fromkeys(JOINTS, 1.0),
-    },
+    "Velocity": {"gains": dict.fromkeys(JOINTS, {"p": 50.0}), "velocity_ff": dict.fromkeys(JOINTS, 1.0)},
 }
 
 
 def arm(interface):
     """Two links of 0.5 m and 1 kg that swing in a vertical plane."""
     parts = [WORLD]
-    for name, parent, child, z in (
-        ("shoulder", "world", "upper", 2),
-        ("elbow", "upper", "lower", -0.5),
-    ):
+    for name, parent, child, z in (("shoulder", "world", "upper", 2), ("elbow", "upper", "lower", -0.5)):
         parts.append(link(child, com="0 0 -0.25", moment=0.021))
         parts.append(joint(name, "revolute", parent, child, f"0 0 {z}", axis="0 1 0", limit=LIMIT))
         parts.append(transmission(name, interface))

@@ -61,8 +61,7 @@ def test_what_is_no_module_is_an_unknown_type(kind) -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["raise ValueError('x')", "raise SystemExit", "raise GeneratorExit", "import no_such_module"],
+    "text", ["raise ValueError('x')", "raise SystemExit", "raise GeneratorExit", "import no_such_module"]
 )
 def test_whatever_an_import_raises_refuses_the_type(module, text) -> None:
     name = module(CONTROLLER + text)

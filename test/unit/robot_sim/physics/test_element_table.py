@@ -4,24 +4,11 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from support.element_documents import (
-    SCHEMAS,
-    documents,
-    every_path,
-    in_urdf,
-    schema_paths,
-    urdf_paths,
-)
+from support.element_documents import SCHEMAS, documents, every_path, in_urdf, schema_paths, urdf_paths
 from support.robots.snippets import box, collision, link, robot, sdf, sdf_link, sdf_world
 
 from robot_sim.physics.description import DescriptionError
-from robot_sim.physics.files.element_table import (
-    BY_DESIGN,
-    READ,
-    WARNED,
-    WithoutEffect,
-    element_table,
-)
+from robot_sim.physics.files.element_table import BY_DESIGN, READ, WARNED, WithoutEffect, element_table
 from robot_sim.physics.files.reading import Resources
 from robot_sim.physics.files.sdf import parse_sdf
 from robot_sim.physics.files.urdf import parse_urdf
@@ -220,10 +207,7 @@ def test_a_friction_in_one_direction_alone_is_told(friction, warned):
     one = parse_urdf(robot(link("l", more=shape), block))
     surface = f"<surface><friction><ode>{friction.format('mu')}</ode></friction></surface>"
     other = parse_sdf(sdf(sdf_link("l", more=collision(box("1 1 1"), surface))))
-    for model, name, place in (
-        (one, "mu1", "gazebo 'l'"),
-        (other, "mu", "link 'l', collision 'c'"),
-    ):
+    for model, name, place in ((one, "mu1", "gazebo 'l'"), (other, "mu", "link 'l', collision 'c'")):
         lines = [f"{each.format(name, place)} (docs/files.md)" for each in warned]
         assert model.warnings == lines
 

@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 from support.robots import snippets
 from support.robots.grippers import transmission
-from support.robots.linkages import (
-    CRANK,
-    GROUND,
-    ROCKER,
-    START,
-    angles,
-    cube,
-    four_bar,
-    hinge,
-    rod,
-    weld,
-)
+from support.robots.linkages import CRANK, GROUND, ROCKER, START, angles, cube, four_bar, hinge, rod, weld
 from support.robots.snippets import joint, link, sdf
 from support.robots.worlds import add_robot, run, start
 

@@ -282,11 +282,7 @@ def test_without_a_name_the_whole_file_is_meant(file, name):
 
 @pytest.mark.parametrize(
     ("part", "height"),
-    [
-        ("<name>low</name>", 0.1),
-        ("<name>high</name>", -0.4),
-        ("<name>high</name><center>true</center>", 0.1),
-    ],
+    [("<name>low</name>", 0.1), ("<name>high</name>", -0.4), ("<name>high</name><center>true</center>", 0.1)],
 )
 def test_a_part_alone_is_what_collides(world, file, part, height):
     made = world.spawn("m", parts_model(part_shape(file, part)), Pose((0.0, 0.0, height + 0.05)))

@@ -44,10 +44,7 @@ def test_models_that_come_and_go_leave_the_others_as_they_are(world):
     ball.place(ball.state()[0], ((1.0, 2.0, 3.0), (0.4, 0.5, 0.6)))
     run(world, 100)
     before = [pole.joint_states(), pole.link_state("pole"), *ball.state()]
-    for change in (
-        lambda: world.spawn("c", slider(), Pose((0.0, 5.0, 0.0))),
-        lambda: world.delete("c"),
-    ):
+    for change in (lambda: world.spawn("c", slider(), Pose((0.0, 5.0, 0.0))), lambda: world.delete("c")):
         change()
         assert [pole.joint_states(), pole.link_state("pole"), *ball.state()] == before
 

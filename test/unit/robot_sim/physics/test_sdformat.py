@@ -238,11 +238,7 @@ def test_built_in_models(sdformat, name):
     check(sdformat, sdformat.folder / name / "model.sdf")
 
 
-DRAWN = {
-    "urdf": (urdf_robots(), 40),
-    "sdf": (sdf_models(), 40),
-    "world": (worlds((*OWN, "crate")), 10),
-}
+DRAWN = {"urdf": (urdf_robots(), 40), "sdf": (sdf_models(), 40), "world": (worlds((*OWN, "crate")), 10)}
 
 
 @pytest.mark.parametrize("kind", DRAWN)

@@ -69,11 +69,7 @@ def test_a_shape_is_seen_where_it_is_in_its_colour(scene, shape, place):
 def test_it_turns_with_its_link(scene):
     spans = []
     for lean in (0.0, math.pi / 2):
-        put(
-            scene,
-            '<box size="0.1 0.1 0.8"/>',
-            MIDDLE._replace(orientation=from_rpy(0.0, lean, 0.0)),
-        )
+        put(scene, '<box size="0.1 0.1 0.8"/>', MIDDLE._replace(orientation=from_rpy(0.0, lean, 0.0)))
         spans.append(np.ptp(where(shown(scene), 0), axis=0))
     assert spans[0][1] > 4 * spans[0][0] and spans[1][0] > 3 * spans[1][1]
 

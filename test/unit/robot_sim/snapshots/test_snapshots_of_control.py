@@ -112,10 +112,7 @@ def test_a_users_controller_is_saved_by_its_attributes(sim):
     future(sim, 10)
     check_branches(sim, lambda: future(sim, 20))
     mine.callback = lambda: 0
-    with (
-        sim.lock,
-        pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and a load_"),
-    ):
+    with sim.lock, pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and a load_"):
         sim.save_state()
 
 
@@ -126,10 +123,7 @@ def test_all_else_is_restored_where_a_users_controller_cannot(sim):
     model = sim.world.models["cartpole"]
     before = sim.now, model.joint_states()
     future(sim, 20)
-    with (
-        sim.lock,
-        pytest.raises(StateError, match=r"load_state_dict\(\) of Faulty raised .*not 10"),
-    ):
+    with sim.lock, pytest.raises(StateError, match=r"load_state_dict\(\) of Faulty raised .*not 10"):
         sim.restore_state(snapshot)
     assert (sim.now, model.joint_states()) == before
 

@@ -61,8 +61,7 @@ def killed(folder: Path, to: Path, step: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [each if each in USUAL else pytest.param(each, marks=pytest.mark.long) for each in TRAININGS],
+    "name", [each if each in USUAL else pytest.param(each, marks=pytest.mark.long) for each in TRAININGS]
 )
 def test_resumed_it_is_the_training_that_was_never_broken_off(tmp_path: Path, name: str) -> None:
     counting = InterruptAfter()
