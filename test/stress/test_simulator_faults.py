@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from gazebo_msgs.srv import GetModelState
-from support.stress.bad_clients import SERVICE
+from support.stress.connections import SERVICE
 from support.stress.disks import can_mount, small_disk
 from support.stress.places import BOUND, ended, launch, place, send, waits
 from support.stress.robots import random_robot

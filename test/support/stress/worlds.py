@@ -12,7 +12,7 @@ import numpy as np
 from gazebo_msgs.srv import DeleteModel, GetModelState, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
 from support.ros.programs import Place, Process
-from support.stress.bad_clients import SERVICE, Address, address
+from support.stress.connections import SERVICE, Address, address
 from support.stress.places import BOUND, OURS, ended, launch, leftovers, pid_of, place, waits
 
 from ros_calls import master

@@ -19,7 +19,7 @@ from gazebo_world import BOX
 from geometry_msgs.msg import Point, Pose, Twist
 from support.ros.calls import BOUND, gazebo, model_names, sim_time, time_passes
 from support.ros.world_case import WorldCase
-from support.stress.bad_clients import address, header, packed
+from support.stress.connections import address, header, packed
 
 CROWD = 30
 LISTENER = """
