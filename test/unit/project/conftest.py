@@ -20,38 +20,6 @@ def ws(root):
     return call
 
 
-class Nobody:
-    """A user without rights, and without a terminal that sudo could ask on."""
-
-    number = 65534
-
-    def __call__(self, script, *arguments, **environment):
-        return run(
-            [script, *arguments], user=self.number, group=self.number, extra_groups=[], cwd="/",
-            env={"PATH": "/usr/bin:/bin"} | environment, start_new_session=True,
-        )  # fmt: skip
-
-    def own(self, folder):
-        os.chown(folder, self.number, self.number)
-
-
-@pytest.fixture
-def nobody():
-    """Runs commands; only root can become another user."""
-    if os.geteuid() != 0:
-        pytest.skip("only root can become another user")
-    return Nobody()
-
-
-@pytest.fixture
-def open_root(root):
-    """Returns this checkout, if other users reach it."""
-    for folder in (root, *root.parents):
-        if not folder.stat().st_mode & 0o001:
-            pytest.skip(f"{folder} is closed to others")
-    return root
-
-
 @pytest.fixture
 def checkout(root, tmp_path, ws):
     """A second checkout, with a blank in its path, that holds just what the first steps need."""

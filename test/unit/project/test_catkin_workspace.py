@@ -138,18 +138,6 @@ def test_built_workspace(workspace: Workspace, space: str) -> None:
     assert listed.returncode == 0, listed.stderr
 
 
-@pytest.mark.parametrize("space", ["devel", "install"])
-def test_scripts_have_the_builds_interpreter(workspace: Workspace, space: str) -> None:
-    folders = [*(workspace.path / space / "lib").glob("*"), workspace.path / space / "bin"]
-    found = [path for folder in folders for path in folder.glob("*")]
-    scripts = [path for path in found if path.is_file() and os.access(path, os.X_OK)]
-    ours = {"gz", "gzserver", "gzclient", "spawner", "unspawner"}
-    ours |= {"controller_manager", "controller_group"}
-    assert ours <= {each.name for each in scripts}
-    for script in scripts:
-        assert script.read_text().startswith(f"#!{workspace.python}\n"), script
-
-
 @pytest.fixture
 def bare(workspace: Workspace):
     """The same workspace, for somebody who has left out pip's step."""
@@ -183,14 +171,3 @@ def test_missing_packages_are_one_line(
     assert arguments == ["-m", "pip", "install", "--requirement"]
     expected = "install/share/cartpole" if space == "install" else "src/cartpole"
     assert Path(file).resolve() == (bare.path / expected / "requirements/base.txt").resolve()
-
-
-def test_programs_that_need_no_more_than_debian_start_without(bare: Workspace) -> None:
-    for command in (
-        ("gz", "--help"),
-        ("rosrun", "gazebo_ros", "spawn_model", "-h"),
-        ("rosrun", "controller_manager", "controller_manager", "--help"),
-        ("rosrun", "controller_manager", "spawner", "--help"),
-    ):
-        ended = bare.inside(*command)
-        assert ended.returncode == 0, f"{command}: {ended.stderr}"

@@ -83,13 +83,6 @@ def test_ready_workspace_is_quiet(ws):
     assert (result.stdout, result.stderr) == ("", "")
 
 
-@pytest.mark.parametrize("place", ["build", "companions/build"])
-def test_the_workspaces_are_built_without_a_compiler(ws, root, place):
-    ws("true")
-    cache = (root / ".ws" / place / "CMakeCache.txt").read_text()
-    assert "CMAKE_MAKE_PROGRAM" in cache and "CMAKE_CXX_COMPILER" not in cache
-
-
 # --- the environment of a command --------------------------------------------------------------
 
 

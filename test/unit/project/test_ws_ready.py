@@ -7,7 +7,6 @@ import re
 import subprocess
 
 import pytest
-from support.python import run
 
 # Debian's tools on a machine where two packages are missing, as a file says.
 TOOLS = {
@@ -41,24 +40,6 @@ def test_clean_removes_what_ws_made(ws, checkout):
     assert ws("clean", script=checkout / "ws").returncode == 0
     assert not (checkout / ".ws").exists()
     assert (checkout / "requirements/base.txt").exists()
-
-
-KEYS = """source tools/ws_steps.sh; source tools/ws_ready.sh
-for step in companions build; do hash_of "$step"; done"""
-
-
-def test_what_is_ready_is_ready_in_every_language(root, tmp_path):
-    """Languages sort names differently: by this one Z goes before a."""
-    tool = tmp_path / "sort"
-    tool.write_text('#!/bin/bash\n[[ ${LC_ALL-} == C ]] || set -- -r "$@"\nexec /usr/bin/sort "$@"\n')
-    tool.chmod(0o755)
-    plain = {"PATH": f"{tmp_path}:/usr/bin:/bin", "ROOT": str(root)}
-    found = {
-        run(["bash", "-c", KEYS], check=True, cwd=root, env=plain | language).stdout
-        for language in ({"LC_ALL": "C"}, {"LC_ALL": "C.UTF-8"}, {"LANG": "C.UTF-8"})
-    }
-    assert len(found) == 1
-    assert re.fullmatch(r"([0-9a-f]{64}\n){2}", found.pop())
 
 
 # --- what it says ------------------------------------------------------------------------------
@@ -158,25 +139,6 @@ def test_a_step_that_takes_long_says_how_far_it_is(root, tmp_path):
     assert (
         tmp_path / ".ws/log/one.log"
     ).read_text() == "half way\nFound existing installation: numpy\nCan't uninstall 'numpy'\nthrough\n"
-
-
-def test_what_a_killed_ws_leaves_running_keeps_the_lock(root, tmp_path):
-    """Or pip and catkin_make would work in one folder twice."""
-    os.mkfifo(tmp_path / "go")
-    command = ["bash", "-c", STEPS.format(tools=root / "tools")]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as first:
-        assert any("half way" in line for line in first.stderr)
-        first.kill()
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as second:
-        line = second.stderr.readline()
-        if "waiting for another ws" not in line:
-            second.kill()  # it would wait for the test
-        assert "waiting" in line
-        (tmp_path / "go").write_text("the first one's step\n")
-        assert any(line.startswith("ws: [1/1] the step ...") for line in second.stderr)
-        (tmp_path / "go").write_text("through\n")
-        told = second.stderr.read()
-    assert second.returncode == 0 and "ready after" in told
 
 
 @pytest.mark.slow

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sysconfig
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -53,34 +51,6 @@ def test_a_python_without_a_lock_file_is_named(steps):
     told = steps("pip_install || echo $?", "3.10").splitlines()
     assert told[0].startswith("ERROR: requirements/ has no lock file for Python 3.10, only ")
     assert told[1:] == ["1"]
-
-
-WHEEL = {
-    "half.py": "def main(): pass\n",
-    "half-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: half\nVersion: 1.0\n",
-    "half-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-    "half-1.0.dist-info/entry_points.txt": "[console_scripts]\nhalf = half:main\n",
-    "half-1.0.dist-info/RECORD": "",
-}
-
-
-@pytest.mark.slow
-def test_what_pip_was_killed_at_is_installed_again(steps, tmp_path):
-    with zipfile.ZipFile(tmp_path / "half-1.0-py3-none-any.whl", "w") as wheel:
-        for name, text in WHEEL.items():
-            wheel.writestr(name, text)
-    place = tmp_path / "venv"
-    run(["/usr/bin/python3", "-m", "venv", "--without-pip", place], check=True)
-    (packages,) = place.glob("lib/*/site-packages")
-    (packages / "pip.pth").write_text(sysconfig.get_path("purelib"))  # this environment's pip
-    code = f"VENV={place}; pip_in_venv --no-index --find-links {tmp_path} half==1.0"
-    steps(code)
-    script, installer = place / "bin/half", packages / "half-1.0.dist-info/INSTALLER"
-    assert "already satisfied" in steps(code)
-    script.unlink()  # pip writes its scripts, and then this file, last
-    installer.unlink()
-    steps(code)
-    assert script.exists() and installer.exists()
 
 
 @pytest.fixture

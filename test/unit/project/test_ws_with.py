@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 
-import psutil
 import pytest
-from support.python import run
 
 pytestmark = pytest.mark.slow  # what one test has built is there for the next
 XML = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
@@ -261,36 +257,6 @@ def test_what_changes_is_built_anew_and_what_goes_is_gone(ws, tmp_path):
     assert ws(*python).returncode == 1
 
 
-COMPILER = """
-set -euo pipefail
-source tools/ws_place.sh; source tools/ws_environment.sh; source tools/ws_with.sh
-CHECKOUT=$PWD ROOT=$PWD SYSTEM_PYTHON=/usr/bin/python3
-set_place {place}
-debian_missing() {{ [[ $1 != compiler.txt ]] || echo {missing}; }}
-is_ready() {{ true; }}
-make_ready() {{ echo "made: $*"; }}
-add_folder --with {folder}
-make_theirs_ready ''
-"""
-
-
-@pytest.mark.parametrize(
-    ("cmake", "missing", "made"),
-    [
-        ("catkin_package()\n", "g++", ""),  # nothing to build
-        ("add_library(x x.cpp)\n", "g++", "made: compiler\n"),
-        ("add_library(x x.cpp)\n", "", ""),
-    ],
-)
-def test_a_compiler_comes_with_the_first_package_that_is_built(root, tmp_path, cmake, missing, made):
-    package(tmp_path / "theirs", "mine", cmake)
-    (tmp_path / "ws/stamp").mkdir(parents=True)
-    for name in ("companions", "build"):
-        (tmp_path / "ws/stamp" / name).touch()
-    code = COMPILER.format(place=tmp_path / "ws", missing=missing, folder=tmp_path / "theirs")
-    assert run(["bash", "-c", code], cwd=root, check=True).stdout == made
-
-
 def test_two_at_once(root, tmp_path):
     """The second waits for the first, and uses what that has built."""
     made = package(tmp_path, "shared", MESSAGES.partition("\n")[2], "message_generation")
@@ -301,75 +267,3 @@ def test_two_at_once(root, tmp_path):
     texts = [each.communicate(timeout=180)[1] for each in both]
     assert [each.returncode for each in both] == [0, 0], texts
     assert sum("building" in text for text in texts) == 1
-
-
-def test_a_folder_and_a_workspace_that_cannot_be_written(open_root, nobody, workspace):
-    with tempfile.TemporaryDirectory() as home:  # pytest's own are closed to other users
-        shutil.copytree(workspace, f"{home}/theirs")
-        os.chmod(home, 0o755)
-        os.mkdir(f"{home}/own")
-        nobody.own(f"{home}/own")
-        drive = ("--with", f"{home}/theirs", "rosrun", "my_messages", "drive")
-        done = nobody(open_root / "ws", *drive, HOME=f"{home}/own")
-        assert (done.returncode, done.stdout) == (0, "1 x: 2\n"), done.stderr
-        assert f"{home}/own/.cache/cartpole" in done.stderr
-
-
-def test_what_failed_is_tried_again_with_other_debian_packages(root, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(root)
-    monkeypatch.syspath_prepend("/usr/lib/python3/dist-packages")
-    from tools.user_packages import build, find
-
-    installed, tried = tmp_path / "status", []
-    installed.touch()
-    package(tmp_path / "theirs", "waiting", "add_custom_target(y)\n")
-    found = find.look_through([tmp_path / "theirs"], [], root)
-    monkeypatch.setattr(build, "DEBIAN", installed)
-    monkeypatch.setattr(build.Overlay, "_build", lambda *_: tried.append(1) or "no library")
-    for time in (1, 1, 2):
-        os.utime(installed, (time, time))
-        overlay = build.Overlay(tmp_path / "made", found.folders, build.Tools("", "", ""))
-        assert overlay.make(found) == {"waiting": "no library"}
-    assert len(tried) == 2
-
-
-def test_what_a_killed_ws_builds_on_keeps_the_next_one_waiting(root, tmp_path):
-    os.mkfifo(tmp_path / "go")
-    package(tmp_path, "slow", f"execute_process(COMMAND cat {tmp_path}/go)\nadd_custom_target(x)\n")
-    command = [root / "ws", "--with", tmp_path, "true"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as first:
-        assert "building your package slow" in first.stderr.readline()
-        read_by_cmake = open(tmp_path / "go", "w")  # noqa: SIM115 - returns when cmake reads it
-        for each in psutil.Process(first.pid).children(recursive=True):
-            if "user_packages" in " ".join(each.cmdline()):
-                each.kill()
-    with read_by_cmake, subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
-        line = second.stderr.readline()
-        if "waiting for another ws that builds your packages" not in line:
-            second.kill()  # it would wait for the test
-        assert "waiting" in line
-        read_by_cmake.close()
-        assert "building your package slow" in second.stderr.readline()
-        (tmp_path / "go").write_text("its own\n")
-        assert "slow: done" in second.stderr.read()
-
-
-@pytest.mark.parametrize(
-    ("cmake", "source", "made"),
-    [
-        ("cuda_add_library(x k.cu)", "k.cu", True),
-        ("add_custom_command(OUTPUT x COMMAND y)", "x.odd", True),
-        ("add_library(x INTERFACE)", "x.odd", True),
-        ("add_custom_target(x)", "robot.proto", True),
-        ("add_custom_target(x)", "robot.urdf", False),
-    ],
-)
-def test_what_cmake_makes_something_of(root, tmp_path, monkeypatch, cmake, source, made):
-    monkeypatch.syspath_prepend(root)
-    monkeypatch.syspath_prepend("/usr/lib/python3/dist-packages")
-    from tools.user_packages import find
-
-    folder = package(tmp_path, "my_made", f"{cmake}\n")
-    (folder / "code.cpp").rename(folder / source)
-    found = find.look_through([tmp_path], [], tmp_path / "root")
-    assert found.packages["my_made"].is_made is made
