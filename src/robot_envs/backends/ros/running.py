@@ -28,6 +28,7 @@ from ros_utils import ros_gazebo
 
 NODE = "/gazebo"
 WORLD_SERVICE = "/gazebo/get_world_properties"
+SPAWN_TIMEOUT = 60.0  # [s], of files that are read, plugins and sensors that start
 STEP_SERVICE = "/gazebo/step_world"  # only a simulator in lock-step has it
 Undo = Callable[[], object]
 
@@ -175,7 +176,7 @@ def spawn(name: str, text: str, pose: Pose, namespace: str = "") -> Undo:
     """
     kind = "urdf" if "<robot" in text else "sdf"
     at = PoseMsg(Point(*pose.position), Quaternion(*pose.orientation))
-    call = SimulatorService(f"/gazebo/spawn_{kind}_model", SpawnModel)
+    call = SimulatorService(f"/gazebo/spawn_{kind}_model", SpawnModel, timeout=SPAWN_TIMEOUT)
     check_success(call(name, text, namespace, at, "world"), f"'{name}' can't be spawned")
     return lambda: ros_gazebo.gazebo_delete_model(name)
 
