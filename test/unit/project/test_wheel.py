@@ -49,8 +49,15 @@ def copy_sources(root: Path, sources: Path) -> None:
 
 @pytest.fixture(scope="module")
 def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    sources = tmp_path_factory.mktemp("wheel") / "sources"
-    copy_sources(root, sources)  # a build leaves files behind
+    return build(root, tmp_path_factory.mktemp("wheel") / "sources")  # a build leaves files behind
+
+
+def build(root: Path, sources: Path, changed_at: float | None = None) -> Path:
+    """The wheel of a copy of the sources, as changed at a time."""
+    copy_sources(root, sources)
+    for path in sources.rglob("*.py"):
+        if changed_at is not None:
+            os.utime(path, (changed_at, changed_at))
     pip(Path(sys.executable), "wheel", "--no-deps", "--wheel-dir", sources, sources, cwd=sources)
     (wheel,) = sources.glob("cartpole-*.whl")
     return wheel
@@ -146,3 +153,8 @@ def test_what_is_pinned_lies_within_what_the_wheel_asks_for(root: Path, name: st
     for pin in pins:
         (version,) = pin.specifier
         assert version.version in ranges[pin.name]
+
+
+def test_a_wheel_is_the_same_bytes_each_time(root: Path, wheel: Path, tmp_path: Path) -> None:
+    again = build(root, tmp_path / "sources", changed_at=1e9)
+    assert again.read_bytes() == wheel.read_bytes()
