@@ -15,7 +15,7 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 from urllib.parse import parse_qs, urlsplit
 
 import msgspec
@@ -144,15 +144,15 @@ class ViewerCameraMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
 
 class GetRenderResponseMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     payload: bytes
+    render_uuid: str
 
 
 class CommandTriggerMessage(msgspec.Struct, tag=True, forbid_unknown_fields=True):
     uuid: str
 
 
-USED = msgspec.msgpack.Decoder(
-    GuiUpdateMessage | ViewerCameraMessage | GetRenderResponseMessage | CommandTriggerMessage
-)
+USED_KINDS = (GuiUpdateMessage, ViewerCameraMessage, GetRenderResponseMessage, CommandTriggerMessage)
+USED: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(Union[USED_KINDS])  # noqa: UP007
 
 
 def is_used(raw: Any) -> bool:

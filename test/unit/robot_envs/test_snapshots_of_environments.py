@@ -236,9 +236,7 @@ def test_a_refused_file_of_another_variation_leaves_the_robot_as_it_was():
         assert returns(env) == returns(same)
 
 
-class Gone:
-    """What another environment's simulator has kept, which has ended."""
-
+class Gone:  # what another environment's simulator has kept, which has ended
     def whole(self):
         raise SimulatorError("it was closed")
 

@@ -1,6 +1,7 @@
 """Where a page is, and who gets in."""
 
 import asyncio
+import dataclasses
 import gzip
 import socket
 import threading
@@ -11,12 +12,13 @@ from importlib.metadata import version
 import msgspec
 import pytest
 from support.pages.browser import wait_for
+from viser import _messages as messages
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 from websockets.sync.client import connect
 
 from web_viewer.address import Address, PortInUse, check
-from web_viewer.server import Gate, ServedPage, is_used
+from web_viewer.server import USED_KINDS, Gate, ServedPage, is_used
 
 TOKEN, COOKIE = "a-token", "viewer_a-to"
 WINDOW = ("the window", "moves the simulation")
@@ -187,6 +189,12 @@ def test_only_messages_of_our_pages_come_in(server, browser):
     for message in [*dropped, encoded(change)]:
         browser.send(message)
     wait_for(lambda: box.value is True, "change")
+
+
+def test_what_pages_send_has_the_fields_of_visers_messages():
+    for kind in USED_KINDS:
+        theirs = getattr(messages, kind.__name__)
+        assert set(kind.__struct_fields__) == {each.name for each in dataclasses.fields(theirs)}
 
 
 def test_a_field_takes_only_what_its_options_and_bounds_admit(server, browser):

@@ -137,14 +137,11 @@ from robot_sim.control.hardware import EFFORT
 
 class Forgetful(Forward):
     interface, type_name = EFFORT, "forgetful/Forgetful"
-
     @classmethod
     def create(cls, name, params, hardware):
         return cls(name, [hardware.joints["cart_pole"]])
-
     def state_dict(self):
         return {}
-
     def load_state_dict(self, state):
         raise RuntimeError("it has forgotten")
 """
