@@ -11,7 +11,7 @@ from rl_workbench.training.progress import tell
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of the command."""
-    add_policy_flags(parser)
+    add_policy_flags(parser, plays=False)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.pt",
                         help="TorchScript: observations (N, ...) to greedy actions (N, ...)")  # fmt: skip
 

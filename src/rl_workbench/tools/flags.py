@@ -16,22 +16,29 @@ POLICIES = (*WHICH, RANDOM)
 
 
 def add_policy_flags(
-    parser: argparse.ArgumentParser, choices: tuple[str, ...] = WHICH, several: bool = False
+    parser: argparse.ArgumentParser,
+    choices: tuple[str, ...] = WHICH,
+    several: bool = False,
+    plays: bool = True,
 ) -> None:
-    """Adds the flags that choose a run, one of its policies (or several), and the environment."""
+    """Adds the flags that choose a run, one of its policies (or several), and the environment.
+
+    A command that `plays` has a seed.
+    """
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
     which = "best by evaluation, newest" + (", or random actions" if RANDOM in choices else "")
     how_many: dict[str, Any] = {"default": "best"}
     if several:
         how_many, which = {"default": ["best"], "nargs": "+"}, f"{which}; several side by side"
     parser.add_argument("--checkpoint", choices=choices, help=f"{which} (default best)", **how_many)
-    add_environment_flags(parser)
+    add_environment_flags(parser, plays)
 
 
-def add_environment_flags(parser: argparse.ArgumentParser) -> None:
-    """Adds the seed of the episodes and the options of the environment."""
-    parser.add_argument("--seed", type=number(0), default=0, metavar="N",
-                        help="seed of the episodes (default 0)")  # fmt: skip
+def add_environment_flags(parser: argparse.ArgumentParser, plays: bool = True) -> None:
+    """Adds the seed of the episodes, if the command `plays` any, and the options of the environment."""
+    if plays:
+        parser.add_argument("--seed", type=number(0), default=0, metavar="N",
+                            help="seed of the episodes (default 0)")  # fmt: skip
     parser.add_argument("--env-kwargs", nargs="+", default=[], metavar="KEY=VALUE",
                         help="options of the environment, e.g. max_steps=200")  # fmt: skip
 

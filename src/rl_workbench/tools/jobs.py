@@ -143,6 +143,7 @@ def _finish(process: subprocess.Popen[bytes], is_stopped: Callable[[], bool]) ->
             must_end = True
         except BaseException:
             os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
             raise
         if must_end and deadline == math.inf:
             deadline = time.monotonic() + TIME_TO_END

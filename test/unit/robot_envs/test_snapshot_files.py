@@ -50,6 +50,33 @@ def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
     assert done.stdout.rpartition("played ")[2].strip() == first
 
 
+def test_varied_robots_are_varied_as_they_were():
+    options = {"randomisation": {"mass": 0.3, "length": 0.2, "pole_friction": 0.01}}
+    env = gymnasium.make("cartpole/Balance-v0", **options).unwrapped
+    env.reset(seed=1)
+    play(env)
+    snapshot = env.save_state()
+    first = play(env)
+    env.reset(seed=9)
+    env.restore_state(snapshot)
+    assert play(env) == first
+    env.close()
+
+
+def test_a_refused_file_of_another_variation_leaves_the_robot_as_it_was():
+    def varied(seed, backend):
+        env = gymnasium.make("cartpole/Balance-v0", randomisation={"mass": 0.5}, backend=backend).unwrapped
+        env.reset(seed=seed)
+        return env
+
+    with varied(1, "bullet") as env, varied(1, "bullet") as same, varied(2, "mujoco") as other:
+        same.save_state()
+        data = other.save_state().to_bytes()
+        with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
+            env.restore_state(EnvSnapshot.from_bytes(data))
+        assert play(env) == play(same)
+
+
 def places(value, place=()):
     """All places of a state that can be replaced."""
     if place:

@@ -145,19 +145,6 @@ def test_the_episode_counts_on_and_ends_as_before(begun):
         returns(env, 1)
 
 
-def test_varied_robots_are_varied_as_they_were():
-    options = {"randomisation": {"mass": 0.3, "length": 0.2, "pole_friction": 0.01}}
-    env = gymnasium.make("cartpole/Balance-v0", **options).unwrapped
-    env.reset(seed=1)
-    returns(env, 5)
-    snapshot = env.save_state()
-    first = returns(env)
-    env.reset(seed=9)
-    env.restore_state(snapshot)
-    assert returns(env) == first
-    env.close()
-
-
 def test_environments_are_neither_copied_nor_pickled(made):
     env = made()
     env.reset(seed=0)
@@ -220,20 +207,6 @@ def test_imperfections_of_another_size_are_refused(begun, option, one, other):
     same.restore_state(EnvSnapshot.from_bytes(first.save_state().to_bytes()))
     with pytest.raises(ValueError, match=f"another environment: its {option} is"):
         second.restore_state(first.save_state())
-
-
-def test_a_refused_file_of_another_variation_leaves_the_robot_as_it_was():
-    def varied(seed, backend):
-        env = gymnasium.make("cartpole/Balance-v0", randomisation={"mass": 0.5}, backend=backend).unwrapped
-        env.reset(seed=seed)
-        return env
-
-    with varied(1, "bullet") as env, varied(1, "bullet") as same, varied(2, "mujoco") as other:
-        same.save_state()
-        data = other.save_state().to_bytes()
-        with pytest.raises(SimulatorError, match="the engine .Mujoco., and here"):
-            env.restore_state(EnvSnapshot.from_bytes(data))
-        assert returns(env) == returns(same)
 
 
 class Gone:  # what another environment's simulator has kept, which has ended

@@ -67,7 +67,7 @@ class ParallelVecEnv(DummyVecEnv):
     """Begins a step in all environments before it waits: those in other processes run at the same time."""
 
     def __init__(self, envs: Sequence[Env]) -> None:
-        super().__init__([repeat(env).__next__ for env in envs])
+        super().__init__([repeat(env).__next__ for env in envs])  # each returns its env
         self._begins = [env.get_wrapper_attr(BEGIN_STEP) for env in envs] if len(envs) > 1 else []
 
     def step_async(self, actions: np.ndarray) -> None:
