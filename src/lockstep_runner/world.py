@@ -170,9 +170,11 @@ def _raised_elsewhere(fault: BaseException) -> BaseException | None:
 
 def is_running() -> bool:
     """Returns whether a simulator in lock-step answers; raises RunsByItself if one in real time does."""
+    # In this order: a simulator that is starting offers the service of lock-step before it can be paused.
+    is_ready = _is_registered(f"{NODE}/pause_physics")
     if _is_registered(SERVICE):
         return master.lives(NODE)
-    if _is_registered(f"{NODE}/pause_physics") and master.lives(NODE):
+    if is_ready and master.lives(NODE):
         raise RunsByItself(
             f"the simulator under {master.uri()} runs in real time: end it, so that the script starts its"
             ' own, or start it with GZSERVER_ARGS="--lockstep --seed 0" in its environment'

@@ -9,7 +9,7 @@ from bullet_gazebo_msgs.srv import AdvanceWorld, AdvanceWorldResponse
 from support.ros.ros_fakes import FakeMaster, FakeService, on_wire
 
 from lockstep_runner import world as world_module
-from lockstep_runner.world import ScriptWorld, WorldFailed
+from lockstep_runner.world import RunsByItself, ScriptWorld, WorldFailed, is_running
 from ros_calls import master as ros_master
 
 ANSWER = AdvanceWorldResponse(success=True, time_step=0.001, ticks=1)
@@ -88,3 +88,19 @@ def test_a_call_left_between_its_halves_is_given_up(world, answers, monkeypatch)
     with pytest.raises(ValueError, match="of a handler"):
         world.advance(5)
     assert world.advance(1).ticks == 1
+
+
+def test_a_simulator_that_has_just_started_is_not_taken_for_one_in_real_time(monkeypatch):
+    there = set()
+
+    def is_offered(service):  # all are registered right after somebody has asked for the first time
+        before = service in there
+        there.update((world_module.SERVICE, f"{world_module.NODE}/pause_physics"))
+        return before
+
+    monkeypatch.setattr(world_module, "is_offered", is_offered)
+    monkeypatch.setattr(ros_master, "lives", lambda node: True)
+    assert is_running()
+    monkeypatch.setattr(world_module, "is_offered", lambda service: service != world_module.SERVICE)
+    with pytest.raises(RunsByItself):
+        is_running()
