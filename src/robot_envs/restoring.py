@@ -13,7 +13,7 @@ from robot_envs.variation.imperfections import Actuator, Sensor
 from robot_envs.world_state import WorldState
 from robot_sim.plain_data import misfit, resolve
 from robot_sim.snapshot import SnapshotError
-from robot_sim.state_dict import StateError, load, state_of, undoable
+from robot_sim.state_dict import StateError, load, module_of, state_of, undoable
 
 
 class SavedEnv(DrawnEnv):
@@ -145,7 +145,7 @@ class SavedEnv(DrawnEnv):
         kind = type(self.task)
         parts = (self._sensor, self._actuator, self._randomisation)
         fits = {
-            "task": f"{kind.__module__}.{kind.__qualname__}", "control period": self.control_period,
+            "task": f"{module_of(kind)}.{kind.__qualname__}", "control period": self.control_period,
             "imperfections": [type(part).__name__ for part in parts if part is not None],
         }  # fmt: skip
         for part in (self._sensor, self._actuator):

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import ATOMS, NUMBERS_AND_TEXTS, Held, StateError, fields_of, plain_key
+from robot_sim.state_dict import ATOMS, NUMBERS_AND_TEXTS, Held, StateError, fields_of, module_of, plain_key
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
@@ -147,7 +147,7 @@ def _extension(value: Any) -> msgpack.ExtType:
         fields = [getattr(value, name) for name in fields_of(kind)]
     else:
         raise StateError(f"a {kind.__qualname__} isn't plain data")
-    return msgpack.ExtType(RECORD, _pack([kind.__module__, kind.__qualname__, fields]))
+    return msgpack.ExtType(RECORD, _pack([module_of(kind), kind.__qualname__, fields]))
 
 
 def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
@@ -215,7 +215,7 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
     kind: Any = sys.modules.get(module)
     for part in name.split("."):
         kind = getattr(kind, "__dict__", {}).get(part)
-    if isinstance(kind, type) and (kind.__module__, kind.__qualname__) == (module, name):
+    if isinstance(kind, type) and (module_of(kind), kind.__qualname__) == (module, name):
         if kind is Record:
             raise StateError("it has a record of records")
         if issubclass(kind, dict) and isinstance(fields, dict):

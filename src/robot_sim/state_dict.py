@@ -209,8 +209,8 @@ def _saved_as(value: Any, kind: type, name: str) -> Any:
         return _saved(value)
     except _Unknown as error:
         raise StateError(
-            f"{kind.__qualname__}.{name}: a snapshot can't save {error}; give {kind.__qualname__} a "
-            "state_dict() and a load_state_dict(), or name the attribute in `non_persistent`"
+            f"{kind.__qualname__}.{name}: a snapshot can't save {error}; keep it in an object of its own with "
+            "state_dict() and load_state_dict(), or name the attribute in `non_persistent`"
         ) from None
     except RecursionError:
         raise StateError(f"{kind.__qualname__}.{name} refers to itself") from None
@@ -259,9 +259,18 @@ def _saved(value: Any) -> Any:
             return value
         made = copy.copy(value)
         for name, each in held.items():
-            object.__setattr__(made, name, _saved(each))
+            try:
+                object.__setattr__(made, name, _saved(each))
+            except _Unknown as error:
+                raise _Unknown(f"{error} in {kind.__qualname__}.{name}") from None
         return made
-    raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}")
+    of = f" of {value.dtype}" if kind is np.ndarray else ""
+    raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}{of}")
+
+
+def module_of(kind: type) -> str:
+    """Returns the module that a class is from: a script's is the same in a process that it spawns."""
+    return "__main__" if kind.__module__ == "__mp_main__" else kind.__module__
 
 
 def fields_of(kind: Any) -> tuple[str, ...]:

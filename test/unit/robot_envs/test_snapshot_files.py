@@ -1,5 +1,6 @@
 """Files of snapshots: in fresh processes, and where somebody has changed them."""
 
+import dataclasses
 import hashlib
 import os
 import random
@@ -12,7 +13,9 @@ import pytest
 from support.scenes import play as script
 from support.scenes.play import play
 
-from robot_envs import EnvSnapshot, SimulatorError
+from cartpole.robot import ROBOT
+from cartpole.tasks import SwingUpTask
+from robot_envs import EnvSnapshot, RobotEnv, SimulatorError
 from robot_sim.plain_data import pack, unpack
 from robot_sim.snapshot import DIGEST, MAGIC, Snapshot, SnapshotError
 
@@ -48,6 +51,30 @@ def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.rpartition("played ")[2].strip() == first
+
+
+def test_scripts_share_their_classes_with_the_processes_that_they_spawn(monkeypatch):
+    class Short(SwingUpTask):
+        def __init__(self):
+            super().__init__()
+            self.mark = None
+
+    @dataclasses.dataclass
+    class Mark:
+        number: int
+
+    envs = {}
+    for module in ("__main__", "__mp_main__"):  # what spawned processes call the script, under both names
+        Mark.__module__ = Short.__module__ = module
+        Mark.__qualname__ = "Mark"
+        monkeypatch.setattr(sys.modules["__main__"], "Mark", Mark, raising=False)
+        envs[module] = RobotEnv(ROBOT, Short())
+        envs[module].reset(seed=0)
+        envs[module].task.mark = Mark(len(envs))
+        if len(envs) == 1:
+            data = envs[module].save_state().to_bytes()
+    envs["__mp_main__"].restore_state(EnvSnapshot.from_bytes(data))
+    assert envs["__mp_main__"].task.mark == Mark(1)
 
 
 def test_varied_robots_are_varied_as_they_were():

@@ -288,11 +288,12 @@ def test_attributes_that_are_not_persistent_stay_also_those_of_a_base():
         (np.zeros(1, [("x", "f8")]), "numpy.ndarray"),
         ({frozenset(): 1}, "frozenset as key"),
         ([{"a": (object(),)}], "builtins.object"),
+        (Mutable([{1}]), "builtins.set in Mutable.items"),
     ],
     ids=lambda each: each if isinstance(each, str) else "",
 )
 def test_what_cannot_be_saved_is_named_with_class_attribute_and_methods(odd, name):
-    told = rf"^Part.item: .*{name}; give Part a state_dict\(\) and a load"
+    told = rf"^Part.item: .*{name}; keep it in an object of its own with state_dict\(\)"
     with pytest.raises(StateError, match=told):
         state_of(Part(inner=Part(item=odd)))
 
