@@ -84,7 +84,7 @@ def picture(results: dict[str, list[list[float]]]) -> Any:
     """Draws the returns of each way's runs over each other."""
     figure = new_figure(10, 3.5)
     for axes, (way, runs) in zip(figure.subplots(1, len(results), sharey=True), results.items(), strict=True):
-        same = "the same bits" if runs[0] == runs[1] else "two results"
+        same = f"twice {digest(runs[0])}" if runs[0] == runs[1] else "two results"
         axes.plot(runs[0], lw=4, alpha=0.35, label="first run")
         axes.plot(runs[1], lw=1.2, color="tab:red", label="second run, busy")
         axes.set_title(f"{way}: {same}", fontsize=10)
