@@ -209,8 +209,8 @@ def _saved_as(value: Any, kind: type, name: str) -> Any:
         return _saved(value)
     except _Unknown as error:
         raise StateError(
-            f"{kind.__qualname__}.{name}: a snapshot can't save {error}; keep it in an object of its own with "
-            "state_dict() and load_state_dict(), or name the attribute in `non_persistent`"
+            f"{kind.__qualname__}.{name}: a snapshot can't save {error}; keep it in an object of its own "
+            "with state_dict() and load_state_dict(), or name the attribute in `non_persistent`"
         ) from None
     except RecursionError:
         raise StateError(f"{kind.__qualname__}.{name} refers to itself") from None

@@ -114,10 +114,12 @@ class Evaluator:
         """Plays greedy episodes; also returns the mean that ranks policies; None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
-        above `best` is confirmed over `confirm_episodes`. `say` is called if the current episode can't be
-        restored, which isn't tried at the training's end (`is_last`).
+        above `best` is confirmed over `confirm_episodes`. `say` is called at the training's end (`is_last`), or
+        if the current episode can't be restored, which isn't tried there.
         """
         self._algorithm.check_weights()
+        if is_last:
+            say(f"evaluating the policy over {self._run.eval_episodes} greedy episodes")
         with self._undisturbed(say, is_last):
             evaluation = self._episodes(self._run.eval_episodes, 0)
             if evaluation is None:

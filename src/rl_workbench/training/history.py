@@ -146,6 +146,7 @@ class Outcome(NamedTuple):
         if self.is_interrupted:
             tell(f"interrupted{self._how_to_resume()}")
         hints, folder = errors.hints, str(self.folder)
+        tell(f"evaluate: {shlex.join([*hints.workbench, 'eval', folder])}")
         tell(f"watch: {shlex.join([*hints.workbench, 'view', folder])}")
         tell(f"curves: {shlex.join([*hints.tensorboard, '--logdir', folder])}")
 
