@@ -66,7 +66,7 @@ def _first(enter: Numbers, leave: Numbers, meets: Numbers) -> Numbers:
 
 
 def box_normals(points: Numbers, sizes: Numbers) -> Numbers:
-    """Returns the outward normals (k, 3) at points of the surface of a box with edges `sizes` (3,)."""
+    """Returns the outward normals (k, 3) at points of the surfaces of boxes with edges `sizes` (k, 3)."""
     shares = points / (0.5 * sizes)
     axes = np.abs(shares).argmax(axis=1)
     rows = np.arange(len(points))
@@ -76,15 +76,15 @@ def box_normals(points: Numbers, sizes: Numbers) -> Numbers:
 
 
 def ball_normals(points: Numbers, sizes: Numbers) -> Numbers:
-    """Returns the outward normals (k, 3) of a ball of radius `sizes[0]`."""
-    return np.asarray(points / sizes[0])
+    """Returns the outward normals (k, 3) of balls of radius `sizes[:, 0]`."""
+    return np.asarray(points / sizes[:, :1])
 
 
 def cylinder_normals(points: Numbers, sizes: Numbers) -> Numbers:
-    """Returns the outward normals (k, 3) of a cylinder of radius `sizes[0]` and length `sizes[1]`."""
-    height = points[:, 2] / (0.5 * sizes[1])
-    on_side = np.hypot(points[:, 0], points[:, 1]) / sizes[0] >= np.abs(height)
-    side = np.column_stack([points[:, :2] / sizes[0], np.zeros(len(points))])
+    """Returns the outward normals (k, 3) of cylinders of radius `sizes[:, 0]` and length `sizes[:, 1]`."""
+    height = points[:, 2] / (0.5 * sizes[:, 1])
+    on_side = np.hypot(points[:, 0], points[:, 1]) / sizes[:, 0] >= np.abs(height)
+    side = np.column_stack([points[:, :2] / sizes[:, :1], np.zeros(len(points))])
     end = np.column_stack([np.zeros((len(points), 2)), np.sign(height)])
     return np.where(on_side[:, None], side, end)
 

@@ -9,6 +9,7 @@ is only compared with shapes whose bounding ball it meets. Worlds of one process
 import hashlib
 import importlib.util
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -40,6 +41,11 @@ class Hits(NamedTuple):
         self.distances[rays[order]] = distances[order]
         self.targets[rays[order]] = np.broadcast_to(targets, distances.shape)[order]
         return order
+
+
+def picked(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Returns some rows (k, ...) of values, laid out by columns, along which NumPy is fast."""
+    return values.T.take(rows, axis=-1).T
 
 
 class RayCaster:
@@ -75,14 +81,17 @@ class RayCaster:
             near: Where rays start, as a distance from the origin [m]; of each ray (n,), or of all.
             far: Where they end.
         """
-        starts = origin + np.reshape(near, (-1, 1)) * directions
+        starts = np.ascontiguousarray(origin + np.reshape(near, (-1, 1)) * directions)
+        directions = np.ascontiguousarray(directions)
         found = self._meet_still(starts, directions)
         rays = np.arange(len(directions))
-        for target in self._planes:
-            found.improve(rays, target, self._plane_distances(target, starts, directions))
+        for target in self.planes:
+            distances = self._plane_distances(target, starts, directions)
+            nearer = distances < found.distances
+            found.distances[nearer], found.targets[nearer] = distances[nearer], target
         targets, rays = self._pairs(origin, directions, np.max(far))
         for kind in self._analytic:
-            some = np.flatnonzero(self._kinds[targets] == kind)
+            some = np.flatnonzero(self._are[kind][targets])
             if not len(some):
                 continue
             distances = self._distances(kind, targets[some], starts[rays[some]], directions[rays[some]])
@@ -94,23 +103,29 @@ class RayCaster:
         found.distances[beyond], found.targets[beyond] = np.inf, NONE
         return found
 
-    def normals(self, target: int, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-        """Returns the normals (k, 3), in world axes, of a target at points (k, 3) of its surface."""
-        turn, kind = self._turns[target], self._kinds[target]
-        if kind == "mesh":
-            corners = self.targets[target].corners().reshape(-1, 3, 3)[triangles]
-            own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            length = np.linalg.norm(own, axis=1, keepdims=True)
-            own = own / np.where(length > 0.0, length, 1.0)
-        else:
-            own = NORMALS[kind]((points - self._places[target]) @ turn, self._sizes[target])
-        return np.asarray(own @ turn.T)
+    def normals(self, targets: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """Returns the normals (k, 3), in world axes, of targets (k,) at points (k, 3) of their surfaces."""
+        turns = picked(self._turns, targets)
+        own = np.einsum("kji,kj->ki", turns, points - picked(self._places, targets))
+        for kind, normals in NORMALS.items():
+            some = self._are[kind][targets].nonzero()[0]
+            own[some] = normals(picked(own, some), picked(self._sizes, targets[some]))
+        for target, some in self.mesh_points(targets):
+            piece = self.targets[target].piece
+            assert piece is not None  # of a visual
+            own[some] = piece.solid.normals[3 * triangles[some]]
+        return np.asarray(np.einsum("kij,kj->ki", turns, own))
+
+    def mesh_points(self, targets: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """Yields each mesh among targets (k,), with the indices where it is."""
+        for target in np.bincount(targets[self._are["mesh"][targets]]).nonzero()[0].tolist():
+            yield target, np.flatnonzero(targets == target)
 
     def _meet_still(self, starts: np.ndarray, directions: np.ndarray) -> Hits:
         met = self._still_triangles.first(starts, directions)
         targets = self._still[met.parts]  # the last one is NONE
         found = Hits(met.distances, targets, met.triangles, met.weights)
-        some = np.flatnonzero(self._are_cylinders[targets])  # their triangles lie within them
+        some = np.flatnonzero(self._are["cylinder"][targets])  # their triangles lie within them
         if len(some):
             exact = self._distances("cylinder", targets[some], starts[some], directions[some])
             found.distances[some] = np.where(exact < np.inf, exact, found.distances[some])
@@ -174,11 +189,14 @@ class RayCaster:
         self.targets = targets
         count = len(targets)
         self.retro = np.array([*(target.shape.retro for target in targets), 0.0])  # of NONE, too
-        self._kinds = np.array([*(target.shape.kind for target in targets), ""])
+        self.tints = 255.0 * np.array([target.rgba[:3] for target in targets]).reshape(-1, 3)
+        kinds = np.array([*(target.shape.kind for target in targets), ""])
+        self._are = {kind: kinds == kind for kind in [*NORMALS, "mesh"]}
+        self.are_solid = ~self._are["plane"] & (kinds != "")
         self._sizes = np.zeros((count, 3))
         self._centres, self._radii = np.zeros((count, 3)), np.zeros(count)
         self._heights = np.full(count, np.inf)
-        self._planes = [i for i in range(count) if self._kinds[i] == "plane"]
+        self.planes = self._are["plane"].nonzero()[0].tolist()
         still, triangles, apart, meshes = [], [], [], {}
         for index, target in enumerate(targets):
             shape = target.shape
@@ -205,8 +223,7 @@ class RayCaster:
             meshes[index] = _built([corners])
         self._still, self._apart = np.array([*still, NONE]), np.array(apart, int)
         self._apart_meshes, self._still_triangles = meshes, _built(triangles)
-        self._are_cylinders = self._kinds == "cylinder"
-        self._analytic = [kind for kind in DISTANCES if kind in self._kinds[apart]]
+        self._analytic = [kind for kind in DISTANCES if self._are[kind][apart].any()]
 
 
 class RayScene(RayCaster):
