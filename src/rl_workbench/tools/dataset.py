@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace, interrupt: Interrupt) -> None:
         compared = ["rewards", "ends", *([] if changed else ["observations"])]
         write.close({
             **origin._asdict(), "env_kwargs": {**origin.env_kwargs, **changed}, "sensors": names,
-            "versions": library_versions(),
+            "versions": library_versions(), "render_fps": env.metadata.get("render_fps"),
             "replay": {"episodes": len(found), "equal_to_the_bit": compared},
         })  # fmt: skip
     tell(f"{out}: {len(found)} episodes, replayed to the bit ({', '.join(compared)})")

@@ -48,7 +48,7 @@ RUN_BY_TESTS = (
     "examples/episode_over_services.py", "examples/test_robot_without_gazebo.py",
     *(f"examples/{name}.py" for name in (
         "first_episode", "own_robot", "many_worlds", "varied_robot", "sensor_readings", "record_gif",
-        "snapshot_file", "steps_over_ros", "dqn_from_saved_states",
+        "snapshot_file", "steps_over_ros", "dqn_from_saved_states", "bag_to_mcap", "to_rerun",
     )),
 )  # fmt: skip
 TRAININGS = {"pg_train.py": pg_train.main, "dqn_train.py": dqn_train.main}
