@@ -114,8 +114,8 @@ class Evaluator:
         """Plays greedy episodes; also returns the mean that ranks policies; None if interrupted.
 
         A policy that is perfect in ten episodes may well fail in the next ninety. So one whose mean return is
-        above `best` is confirmed over `confirm_episodes`. `say` is called at the training's end (`is_last`), or
-        if the current episode can't be restored, which isn't tried there.
+        above `best` is confirmed over `confirm_episodes`. `say` is called at the training's end (`is_last`),
+        or if the current episode can't be restored, which isn't tried there.
         """
         self._algorithm.check_weights()
         if is_last:
