@@ -49,11 +49,6 @@ class PgTrainFaults(PlaceCase):
         self.assert_nothing_left()
         self.assertFalse(self.place.run.exists())
 
-    def test_a_simulator_that_dies_in_real_time(self):
-        training = self.training("--realtime")
-        self.place.send_to_simulator(signal.SIGKILL)
-        self.assertGreater(min(self.assert_failed(training)["lengths"]), 1)
-
     def test_a_simulator_that_hangs(self):
         training = self.training()
         self.place.send_to_simulator(signal.SIGSTOP)
