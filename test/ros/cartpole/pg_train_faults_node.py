@@ -55,20 +55,6 @@ class PgTrainFaults(PlaceCase):
         self.assert_failed(training)
         self.assertIn("no answer within 5", training.output)  # and the time of the steps
 
-    def test_the_simulator_that_takes_its_own_ones_place_lives_on(self):
-        port = self.place.environment["ROS_MASTER_URI"].rpartition(":")[2]
-        core = self.place.start("roscore", "-p", port)
-        core.wait_for("started core service")
-        training = self.training()
-        other = self.place.start("rosrun", "gazebo_ros", "gzserver", "--replace", "--lockstep")
-        self.assertIn("another one runs as /gazebo", self.ends(training, 1))
-        self.assert_saved()
-        self.run_here("rosservice", "call", "/gazebo/get_world_properties")
-        other.interrupt()
-        self.ends(other)
-        core.interrupt()
-        self.assert_nothing_left()
-
 
 if __name__ == "__main__":
     rostest.rosrun("cartpole", "pg_train_faults", PgTrainFaults)
