@@ -105,11 +105,11 @@ run_tests() {  # [--fast] [ARG...]
     for argument in "$@"; do
         if [[ $argument == --fast ]]; then fast=yes; else arguments+=("$argument"); fi
     done
-    # Three processes for two cores, because tests over ROS wait a quarter of their time. Each file stays
+    # Four processes for two cores, because tests over ROS wait half of their time. Each file stays
     # in one process, which makes its fixtures once. Without reordering, long files start first.
     if [[ ${#arguments[@]} -eq 0 ]]; then
         [[ -n $fast ]] || say "all tests take up to two hours, ./ws test --fast takes a minute or two"
-        arguments=(--numprocesses 3 --dist loadfile --no-loadscope-reorder)
+        arguments=(--numprocesses 4 --dist loadfile --no-loadscope-reorder)
     fi
     [[ -z $fast ]] || arguments=(-m "not ($NOT_FAST)" "${arguments[@]}")
     cd -- "$ROOT"

@@ -144,7 +144,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Long files first: the last ones that run beside each other are short."""
+    """Long files first: the last ones that run beside each other are short. Those over ROS, which wait half
+    of their time, are spread among those that compute."""
     stress_plugin.deselect_full(config, items)
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: (not item.get_closest_marker("rostest"), item.path not in slow))
+    place: dict[Path, float] = {}
+    for kind in ("slow", "rostest"):
+        files = list(dict.fromkeys(item.path for item in items if item.get_closest_marker(kind)))
+        place |= {path: index / len(files) for index, path in enumerate(files)}
+    items.sort(key=lambda item: place.get(item.path, 1.0))

@@ -89,8 +89,9 @@ def faults(root: Path) -> Iterator[str]:
 
 def markdown_files(root: Path) -> list[Path]:
     """All Markdown files but those in hidden folders, which aren't ours to check."""
-    found = (path.relative_to(root) for path in root.rglob("*.md"))
-    return sorted(root / path for path in found if not path.parts[0].startswith("."))
+    tops = [path for path in root.iterdir() if not path.name.startswith(".")]
+    found = (path for top in tops for path in (top.rglob("*.md") if top.is_dir() else [top]))
+    return sorted(path for path in found if path.suffix == ".md")
 
 
 def paths(code: str, root: Path) -> Iterator[str]:

@@ -190,10 +190,8 @@ class HectorGpsPlugin(HectorSensor):
         super().__init__(context)
         self._latitude, self._longitude, heading, self._altitude = (
             context.number(f"reference{name}", default)
-            for name, default in (
-                ("Latitude", 49.9), ("Longitude", 8.9), ("Heading", 0.0), ("Altitude", 0.0),
-            )
-        )  # fmt: skip
+            for name, default in (("Latitude", 49.9), ("Longitude", 8.9), ("Heading", 0.0), ("Altitude", 0.0))
+        )
         self._heading = math.radians(heading)
         sine = math.sin(math.radians(self._latitude))
         squared = FLATTENING * (2.0 - FLATTENING)

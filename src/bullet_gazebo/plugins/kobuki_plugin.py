@@ -132,10 +132,8 @@ class _Senses(Stateful):
         SensorTopic(context, below("sensors/core"), SensorState, CORE_RATE, self._core)
         self._events = {
             name: advertised(context, below(f"events/{name}"), kind, 10)
-            for name, kind in (
-                ("bumper", BumperEvent), ("cliff", CliffEvent), ("wheel_drop", WheelDropEvent),
-            )
-        }  # fmt: skip
+            for name, kind in (("bumper", BumperEvent), ("cliff", CliffEvent), ("wheel_drop", WheelDropEvent))
+        }
         self._threshold = length(context, "cliff_detection_threshold", 0.0)  # [m]
         tags = _tags("cliff_sensor_{}_name", SIDES)
         self._down = [LaserSensor(_mount(context, tag, "ray")) for tag in tags]
@@ -188,8 +186,7 @@ class _Senses(Stateful):
     def _core(self, now: int) -> SensorState:
         message = SensorState(header=Header(stamp=to_time(now)), time_stamp=now // 1_000_000 % 65536)
         for name, states in self._state.items():
-            # Of two wheels the right one has the lowest bit.
-            bits = BITS[-len(states) :]
+            bits = BITS[-len(states) :]  # of two wheels the right one has the lowest bit
             setattr(message, name, sum(bit for bit, on in zip(bits, states, strict=True) if on))
         return message
 

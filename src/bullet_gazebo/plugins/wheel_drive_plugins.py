@@ -31,8 +31,7 @@ class DiffDrivePlugin(WheeledPlugin):
             context.number("wheelTorque", 5.0),
         )
         self._ramp = Ramp(context.number("wheelAcceleration", 0.0), 2)
-        # The original's order is right, left.
-        self._joints = self._wheels.joints[::-1]
+        self._joints = self._wheels.joints[::-1]  # the original's order is right, left
         self.measure_by(self._separation, [(each, each.child) for each in self._joints])
         level = LEVELS.get(context.text("rosDebugLevel", "").lower())
         if level is not None:

@@ -90,8 +90,7 @@ class SpawnServices:
         self._under_way.append(request)
         try:
             self._checked_pose(request)  # before anything takes time
-            # Reading may take long; others spawn meanwhile.
-            reading = Reading(cancelled=rospy.is_shutdown)
+            reading = Reading(cancelled=rospy.is_shutdown)  # reading may take long; others spawn meanwhile
             entity = read_entity(text, request.model_name, resources(), reading)
             own = entity.pose if isinstance(entity, Light) else entity.initial_pose
             with self._one_at_a_time:

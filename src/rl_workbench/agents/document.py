@@ -104,8 +104,7 @@ class PolicyGradientAgent(TwoNetworks):
         """
         observations = torch.from_numpy(np.stack(episode.observations))  # (T, 4)
         actions = torch.tensor(episode.actions)  # (T,)
-        # (T,), float64
-        returns = torch.from_numpy(discounted_sums(episode.rewards, self.settings.gamma))
+        returns = torch.from_numpy(discounted_sums(episode.rewards, self.settings.gamma))  # (T,), float64
         values = self.value(observations).squeeze(1)  # (T,)
         advantages = (returns - values.detach().double()).float()
         value_loss = nn.functional.mse_loss(values, returns.float())

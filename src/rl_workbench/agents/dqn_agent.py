@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from rl_workbench.agents.adam import Adam
 from rl_workbench.agents.greedy import SingleChoice
 from rl_workbench.agents.normalisation import Normaliser
 from rl_workbench.agents.replay import Batch, NStepReturns, ReplayBuffer
@@ -40,7 +41,7 @@ class DQNAgent:
         self.q_net = self._network(observation_size, seed)
         self.target_net = self._network(observation_size, seed).requires_grad_(False).eval()
         self._flat, self._target = FlatParameters(self.q_net), FlatParameters(self.target_net)
-        self._optimizer = torch.optim.Adam([self._flat.vector], settings.learning_rate, fused=True)
+        self._optimizer = Adam([self._flat.vector], settings.learning_rate, fused=True)
         self._loss = nn.functional.mse_loss if settings.loss == "mse" else nn.functional.huber_loss
         self.buffer = ReplayBuffer(settings.buffer_size, observation_size)
         self.normaliser = Normaliser(observation_size) if settings.normalize_observations else None

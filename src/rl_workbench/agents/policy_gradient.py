@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from rl_workbench.agents.adam import Adam
 from rl_workbench.errors import WorkbenchError
 from rl_workbench.states import generator_state, load_optimizer, set_generator
 
@@ -94,8 +95,8 @@ class TwoNetworks(ABC):
     def __init__(self, policy: nn.Module, value: nn.Module, rates: tuple[float, float], seed: int) -> None:
         self.policy = policy
         self.value = value
-        self.policy_optimizer = torch.optim.Adam(policy.parameters(), rates[0])
-        self.value_optimizer = torch.optim.Adam(value.parameters(), rates[1])
+        self.policy_optimizer = Adam(policy.parameters(), rates[0])
+        self.value_optimizer = Adam(value.parameters(), rates[1])
         self.generator = np.random.default_rng(seed)
 
     @abstractmethod

@@ -130,8 +130,7 @@ def _joint(element: Element) -> JointHandle:
     limits = JointLimits()
     if limit is not None:
         bounded = kind in ("revolute", "prismatic")
-        # As Gazebo swaps them.
-        lower, upper = sorted((_float(limit, "lower"), _float(limit, "upper")))
+        lower, upper = sorted((_float(limit, "lower"), _float(limit, "upper")))  # as Gazebo swaps them
         limits = JointLimits(
             lower=lower if bounded else None,
             upper=upper if bounded else None,

@@ -53,8 +53,7 @@ class DeadReckoning(Stateful):
 
     def move_on_arc(self, ahead: float, turn: float, left: float = 0.0) -> None:
         """Adds a motion as `move`, along an arc of that length."""
-        # The chord of the arc has the direction half-way.
-        half = 0.5 * turn
+        half = 0.5 * turn  # the chord of the arc has the direction half-way
         share = 1.0 if abs(turn) < STRAIGHT else math.sin(half) / half
         self.move(share * ahead, turn, share * left)
 

@@ -17,8 +17,7 @@ RANGES = {  # of each number of a field that a user names
     "target": (-1e6, 1e6), "distance": (1e-3, 1e6), "yaw": (-360.0, 360.0), "pitch": (-90.0, 90.0),
     "view": (1.0, 170.0), "follows": (0, 1),
 }  # fmt: skip
-# Neither white, grey nor black, so that robots stand out.
-SKY = (228, 235, 243)
+SKY = (228, 235, 243)  # neither white, grey nor black, so that robots stand out
 TILES = ((134, 153, 174), (117, 137, 159))
 TILES_IN_SIGHT = 8.0  # within the camera's distance
 FADING = 3.0  # of the camera's distance, until a third of the colour is left

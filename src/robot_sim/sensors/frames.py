@@ -9,8 +9,7 @@ from robot_sim.physics.pose import Pose
 
 def frames(poses: Sequence[Pose]) -> tuple[np.ndarray, np.ndarray]:
     """Returns rotation matrices (n, 3, 3) and positions (n, 3) of poses."""
-    # Mostly few: NumPy would take ten times as long.
-    turns = [_turn(*pose.orientation) for pose in poses]
+    turns = [_turn(*pose.orientation) for pose in poses]  # mostly few: NumPy would take ten times as long
     places = np.array([pose.position for pose in poses]).reshape(-1, 3)
     return np.array([*zip(*turns, strict=True)]).reshape(3, 3, -1).transpose(2, 0, 1), places
 

@@ -49,30 +49,11 @@ class PgTrainFaults(PlaceCase):
         self.assert_nothing_left()
         self.assertFalse(self.place.run.exists())
 
-    def test_a_simulator_that_dies_in_real_time(self):
-        training = self.training("--realtime")
-        self.place.send_to_simulator(signal.SIGKILL)
-        self.assertGreater(min(self.assert_failed(training)["lengths"]), 1)
-
     def test_a_simulator_that_hangs(self):
         training = self.training()
         self.place.send_to_simulator(signal.SIGSTOP)
         self.assert_failed(training)
         self.assertIn("no answer within 5", training.output)  # and the time of the steps
-
-    def test_the_simulator_that_takes_its_own_ones_place_lives_on(self):
-        port = self.place.environment["ROS_MASTER_URI"].rpartition(":")[2]
-        core = self.place.start("roscore", "-p", port)
-        core.wait_for("started core service")
-        training = self.training()
-        other = self.place.start("rosrun", "gazebo_ros", "gzserver", "--replace", "--lockstep")
-        self.assertIn("another one runs as /gazebo", self.ends(training, 1))
-        self.assert_saved()
-        self.run_here("rosservice", "call", "/gazebo/get_world_properties")
-        other.interrupt()
-        self.ends(other)
-        core.interrupt()
-        self.assert_nothing_left()
 
 
 if __name__ == "__main__":

@@ -54,9 +54,8 @@ class PgTrain(PlaceCase):
             self.assertTrue(all(torch.equal(ours[key], theirs[key]) for key in ours), name)
 
     def test_over_ros_killed_and_resumed_the_weights_are_those_of_one_go_in_this_process(self):
-        """With a simulator for each of two environments: the same seed gives the same weights, whatever
-        moves the robots."""
-        flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--num-envs=2", "--seed=4",
+        """The same seed gives the same weights, whatever moves the robot."""
+        flags = ("--start-noise=0.05", "--episodes=30", "--eval-episodes=1", "--seed=4",
                  "--checkpoint-frequency=60")  # fmt: skip
         inside, killed = self.place, self.new_place()
         self.assertEqual(pg_train.main([f"--run-dir={inside.run}", *flags, "--backend=bullet"]), 0)

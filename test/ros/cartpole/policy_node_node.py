@@ -30,7 +30,7 @@ UPRIGHT, LONG = 0.2, 1.5  # [rad], [s of simulated time]
 PUSHED = [0.0, 0.04]  # [m], [rad]: held as it is, the cart's pole is down within a second
 TRAINING = {
     "env_id": "cartpole/Balance-v0", "env_kwargs": {"noise": 0.05, "max_steps": 500}, "seed": 1,
-    "episodes": 300, "stop_at_length": 400, "eval_frequency": 0, "eval_episodes": 1,
+    "episodes": 300, "stop_at_length": 200, "eval_frequency": 0, "eval_episodes": 1,
     "observation_scale": "0.4,1.0,0.2,2.0", "policy_learning_rate": 0.03,
     "value_learning_rate": 0.01, "value_epochs": 20,
 }  # fmt: skip

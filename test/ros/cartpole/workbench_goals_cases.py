@@ -1,7 +1,6 @@
 """workbench.py with an arm that reaches for goals: the same figures over ROS as in-process.
 
-Evaluations come in the midst of episodes, and move the robot that is learned with. Halfway, in the midst of
-an episode, the training over ROS ends with its simulator, and is gone on with in another one.
+Evaluations come in the midst of episodes, and move the robot that is learned with.
 """
 
 import importlib.util
@@ -24,9 +23,6 @@ def figures(run: Path) -> list[str]:
 
 
 class WorkbenchGoals(PlaceCase):
-    def over_ros(self, *arguments: str) -> None:
-        self.run_here("rosrun", "cartpole", "workbench.py", *arguments)
-
     def here(self, *arguments: str) -> None:
         self.assertEqual(workbench.main(list(arguments)), 0)
 
@@ -36,13 +32,12 @@ class WorkbenchGoals(PlaceCase):
         params = ["her=true", "learning_starts=100", "net_arch=[16]", "batch_size=16", "train_freq=2",
                   "eval_frequency=130", "eval_episodes=2"]  # fmt: skip
 
-        def train(run, backend, steps):
+        def train(run, backend):
             return ["train", "--algo", "sac", "--env-id", ARM, "--env-kwargs", f"backend={backend}",
-                    "--run-dir", str(run), "--params", f"total_timesteps={steps}", *params]  # fmt: skip
+                    "--run-dir", str(run), "--params", "total_timesteps=300", *params]  # fmt: skip
 
-        self.over_ros(*train(ros, "ros", 150))
-        self.over_ros("train", "--resume", str(ros), "--total-timesteps", "300")
-        self.here(*train(here, "bullet", 300))
+        self.run_here("rosrun", "cartpole", "workbench.py", *train(ros, "ros"))
+        self.here(*train(here, "bullet"))
         self.assertEqual(figures(ros), figures(here))
         evaluated = [row.split(",")[0] for row in figures(ros) if ",eval/success_rate," in row]
         self.assertEqual(evaluated, ["130", "260", "300"])

@@ -153,20 +153,17 @@ class LaunchingTest(unittest.TestCase):
             path.write_text(text)
             return self.ends(start(path, env=simulation.environment()), code)
 
-    def test_a_simulator_that_dies_is_told_of(self):
-        out, err = self.run_script(KILLING + "time.sleep(0.1)\nprint('went on')\n", 1)
-        self.assertIn("the simulator has died", err)
-        self.assertNotIn("Traceback", err)
-        self.assertNotIn("went on", out)
-
-    def test_it_ends_a_script_that_catches_everything_and_waits_in_threads(self):
+    def test_a_simulator_that_dies_is_told_of_and_ends_a_script_that_catches_all_and_waits_in_threads(self):
         text = (
             "import threading\ndef loop():\n while True: rospy.sleep(0.1)\n"
             "threading.Thread(target=loop).start()\n"
-            "while True:\n try: rospy.sleep(0.1)\n except: pass\n"
+            "while True:\n try:\n  time.sleep(0.1)\n  print('went on')\n except: pass\n"
         )
-        _, err = self.run_script(KILLING + text, 1)
+        out, err = self.run_script(KILLING + text, 1)
         self.assertEqual(err.count("lockstep: "), 1, err)
+        self.assertIn("the simulator has died", err)
+        self.assertNotIn("Traceback", err)
+        self.assertNotIn("went on", out)
 
     def test_the_end_of_a_script_is_told_once_for_all_nodes_that_follow_it(self):
         node = "import rospy, sys; rospy.init_node(sys.argv[1])\nwhile True: rospy.sleep(0.1)\n"

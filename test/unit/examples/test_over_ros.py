@@ -16,12 +16,15 @@ def test_episodes_over_services_balance_in_lockstep(printed) -> None:
     assert told == [f"episode {n}: 200 steps" for n in range(3)]
 
 
-def test_random_changes_of_a_policy_learn(printed) -> None:
-    text = printed(LOCKSTEP, "--seed=0", "learn_over_services.py")
-    returns = dict.fromkeys(range(60), 0.0)
+def test_random_changes_of_a_policy_learn(printed, tmp_path: Path) -> None:
+    """In two thirds of its episodes."""
+    code = (LOCKSTEP.parents[1] / "examples/learn_over_services.py").read_text()
+    (tmp_path / "learn.py").write_text(code.replace("EPISODES, STEPS = 60,", "EPISODES, STEPS = 40,"))
+    text = printed(LOCKSTEP, "--seed=0", tmp_path / "learn.py")
+    returns = dict.fromkeys(range(40), 0.0)
     for episode, reward in re.findall(r"Episode (\d+), .*Reward=(\S+)", text):
         returns[int(episode)] += float(reward)
-    assert min(list(returns.values())[-10:]) > 180.0 > returns[0]
+    assert min(list(returns.values())[-6:]) > 180.0 > returns[0]
 
 
 def test_the_tests_of_a_robot_pass(printed) -> None:

@@ -16,10 +16,10 @@ def example(imported) -> Any:
     return imported("plan_with_snapshots")
 
 
-@pytest.mark.parametrize(("name", "fewer"), [("cart-pole", {"rounds": 1}), ("rover", {"plans": 8})], ids=str)
-def test_it_gets_there(example: Any, name: str, fewer: dict[str, int], monkeypatch, capsys) -> None:
+@pytest.mark.parametrize("name", ["cart-pole", "rover"])
+def test_it_gets_there(example: Any, name: str, monkeypatch, capsys) -> None:
     """With less thought than it takes by itself."""
-    monkeypatch.setitem(example.PROBLEMS, name, example.PROBLEMS[name]._replace(**fewer))
+    monkeypatch.setitem(example.PROBLEMS, name, example.PROBLEMS[name]._replace(rounds=1, plans=8))
     monkeypatch.setattr(sys, "argv", ["plan_with_snapshots.py", name])
     example.main()
     assert capsys.readouterr().out.startswith("done after ")

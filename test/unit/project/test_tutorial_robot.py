@@ -7,6 +7,8 @@ commands run in this process, but for those over ROS: to start each takes second
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
 import shlex
 import signal
@@ -22,6 +24,10 @@ from support.pages.code_blocks import Block, blocks
 from support.python import run
 
 from cartpole import workbench
+from robot_envs.backends.ros.bringup import ready
+from robot_envs.scene import Scene
+from ros_calls import master
+from ros_calls.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[3]
 ARM, VEHICLE, TESTS = (ROOT / "docs" / f"{name}.md" for name in ("tutorial_robot", "mobile", "testing"))
@@ -114,9 +120,15 @@ class Reader:
 
     def work(self, arguments: list[str]) -> None:
         """Runs a command of the workbench here, with the package as it is now."""
-        try:
+        with self.fresh():
             assert workbench.main(arguments) == 0, arguments
-        finally:  # the next command, and the next test, find what is written then
+
+    @contextlib.contextmanager
+    def fresh(self) -> Iterator[None]:
+        """The next command, and the next test, find what is written of the package then."""
+        try:
+            yield
+        finally:
             for name in [each for each in sys.modules if each.partition(".")[0] == self.package]:
                 del sys.modules[name]
 
@@ -132,14 +144,10 @@ class Reader:
                 [ROOT / "ws", *words, "gui:=false"], cwd=self.folder, env=self.environment, text=True,
                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
             )  # fmt: skip
-            code = (
-                "from robot_envs.backends.ros.bringup import ready;"
-                f"from robot_envs.scene import Scene; from {self.package}.robot import ROBOT;"
-                "from ros_calls.waiting import wait_until;"
-                "import rosgraph; assert wait_until(rosgraph.is_master_online, 180, 'master');"
-                "ready(Scene([ROBOT])).wait(180)"
-            )
-            self.run(["--with", self.place, "python3", "-c", code])
+            with master.using(self.environment["ROS_MASTER_URI"]), self.fresh():
+                robot = importlib.import_module(f"{self.package}.robot").ROBOT
+                assert wait_until(master.is_up, LIMIT, "the master")
+                ready(Scene([robot])).wait(LIMIT)
 
     def move(self, words: list[str]) -> None:
         """Has the policy move the simulated robot, and ends it with Ctrl-C."""

@@ -14,7 +14,7 @@ from rl_workbench.training.train import PROGRAM
 SRC = Path(__file__).parents[3] / "src"
 OURS = {path.name for path in SRC.iterdir() if path.is_dir()}
 HEAVY = ("gymnasium", "numpy", "torch", "ray", "optuna", "viser", "trimesh", "matplotlib",
-         "stable_baselines3", "pybullet")  # fmt: skip
+         "stable_baselines3", "pybullet", "torch._dynamo")  # fmt: skip
 COUNT = f"""
 import sys
 from rl_workbench.cli import main
@@ -77,7 +77,8 @@ def imported(*arguments: str) -> tuple[list[str], list[str]]:
 def test_a_training_imports_few_of_our_files(tmp_path: Path) -> None:
     short = ["--total-timesteps=50", "--eval-episodes=1", "--confirm-episodes=0"]
     flags = ["--algo=dqn", "--env-id=CartPole-v1", *short, f"--run-dir={tmp_path / 'run'}"]
-    ours, _ = imported("train", *flags)
+    ours, heavy = imported("train", *flags)
+    assert "torch._dynamo" not in heavy, "torch's compiler"
     assert (tmp_path / "run/summary.json").is_file()
     assert len(ours) <= 60, ours
 

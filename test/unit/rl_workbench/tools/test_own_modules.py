@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from support.training.workbench_runs import work
 import rl_workbench
 from rl_workbench import cli
 from rl_workbench.training.algorithms import ALGORITHMS
-from rl_workbench.training.train import PROGRAM, choose
+from rl_workbench.training.train import choose
 
 pytestmark = pytest.mark.slow
 
@@ -49,13 +48,6 @@ def trained(module: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "run"
     assert cli.main(["train", "--algo", "dqn", *SMALL, "--run-dir", str(folder)]) == 0
     return folder
-
-
-def test_another_process_goes_on(trained: Path) -> None:
-    command = [*PROGRAM, "train", "--resume", str(trained), "--total-timesteps", "340"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "resuming at step 300 of 340" in done.stdout
 
 
 def test_eval_knows_the_line_and_the_successes(trained: Path, capsys) -> None:

@@ -17,7 +17,7 @@ from rl_workbench import cli
 pytestmark = [pytest.mark.extras("ray"), pytest.mark.slow, pytest.mark.xdist_group("ray")]
 
 # Long enough to be killed in the middle, on any machine; a checkpoint every few milliseconds.
-PARAMS = ["total_timesteps=5000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
+PARAMS = ["total_timesteps=3000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
           "eval_frequency=1000", "eval_episodes=1", "confirm_episodes=1",
           "checkpoint_frequency=100"]  # fmt: skip
 
