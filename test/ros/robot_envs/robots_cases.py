@@ -9,9 +9,11 @@ import robot_envs.robots  # noqa: F401 - registers the environments
 from robot_envs.testing import check_robot_env, differences, rollout
 from robot_envs.world_state import InitialState, Push
 
-# One of each kind of controllers, bases and sensors: a simulator of its own takes most of a robot's time.
+# One of each robot; the others differ in what is made of the same numbers. A test ends with the robot, and so
+# with the simulator, of the next one.
 CASES = {
-    "TwoLinkReachGoal": {}, "PickCube": {}, "Furuta": {}, "NavigateImages": {"world": "gates"},  # which swing
+    "TwoLinkReachGoal": {}, "SixJointReach": {}, "PickCube": {}, "Furuta": {}, "DoublePendulum": {},
+    "Hopper": {}, "Navigate": {}, "NavigateImages": {"world": "gates"},  # which swing
     "Quadruped": {},
 }  # fmt: skip
 
