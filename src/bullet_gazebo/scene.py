@@ -32,6 +32,7 @@ from bullet_gazebo.common.messages import from_pose_msg, to_pose_msg, to_time, t
 from bullet_gazebo.common.publishing import SubscriberCount
 from robot_sim.physics.description import Color, Joint, Light, Link, Shape
 from robot_sim.physics.model import Model
+from robot_sim.physics.pose import Pose
 from robot_sim.pictures.visuals import VisibleModel, visible_model
 from robot_sim.simulator import Simulator
 
@@ -173,7 +174,7 @@ def to_model(model: Model, number: int, collisions: bool) -> SceneModel:
         links=[
             SceneLink(link.name, _to_shapes(link.visuals), _to_shapes(link.collisions)) for link in seen.links
         ],
-        joints=[_to_joint(joint) for joint in seen.joints],
+        joints=[_to_joint(joint, seen.tips[joint.name]) for joint in seen.joints],
         root=seen.root,
         frame=to_pose_msg(seen.frame),
     )
@@ -191,6 +192,7 @@ def from_model(message: SceneModel) -> VisibleModel:
         message.root,
         from_pose_msg(message.frame),
         message.is_static,
+        {each.name: from_pose_msg(each.tip) for each in message.joints},
     )
 
 
@@ -208,15 +210,16 @@ def from_light(message: SceneLight) -> Light:
     )  # fmt: skip
 
 
-def _to_joint(joint: Joint) -> SceneJoint:
+def _to_joint(joint: Joint, tip: Pose) -> SceneJoint:
     lower, upper = (joint.lower, joint.upper) if joint.bounded else NO_STOP
     frame, axis = to_pose_msg(joint.anchor), Vector3(*joint.axis)
-    return SceneJoint(joint.name, joint.kind, joint.child, frame, axis, lower, upper)
+    place = joint.parent, to_pose_msg(joint.pose), to_pose_msg(tip)
+    return SceneJoint(joint.name, joint.kind, joint.child, frame, axis, lower, upper, *place)
 
 
 def _from_joint(message: SceneJoint) -> Joint:
     return Joint(
-        message.name, message.kind, parent="", child=message.child,
+        message.name, message.kind, message.parent, message.child, from_pose_msg(message.pose),
         anchor=from_pose_msg(message.frame), axis=to_vector(message.axis), lower=message.lower,
         upper=message.upper,
     )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from bullet_gazebo.window.panels import Attempt, Controllers
+from bullet_gazebo.window.panels import MOVE_TIME, Attempt, Controllers
 from bullet_gazebo.window.remote_scene import Commands
 from robot_sim.physics.description import Joint
 from robot_sim.physics.files.elements import shown
@@ -45,11 +45,12 @@ class ModelPanel:
     ) -> None:
         self._server, self._world = server, world
         self._commands = commands
-        self._controllers = controllers
-        self._attempt = attempt
+        self.controllers = controllers
+        self.attempt = attempt
         self._stands = stands
-        self._models: dict[str, VisibleModel] = {}
-        self._positions: dict[str, list[float]] = {}  # of joints, by model
+        self.models: dict[str, VisibleModel] = {}
+        self.at: dict[str, dict[str, float]] = {}  # positions of joints by model [rad, m]
+        self.sent: dict[str, float] = {}  # set-points by joint [rad, m]
         self._chosen = NONE  # the model that has sliders; a click may choose another at any time
         self._start: np.ndarray | None = None  # [m] where the followed model was at first
         self._followed = ""
@@ -66,19 +67,20 @@ class ModelPanel:
 
     def set_models(self, models: Sequence[VisibleModel]) -> None:
         """Lists these models."""
-        self._models = {each.name: each for each in models}
-        names = [NONE, *self._models]
+        self.models = {each.name: each for each in models}
+        self.sent.clear()
+        names = [NONE, *self.models]
         if list(self._choice.options) != names:
             kept = self._choice.value
             self._choice.options = names
-            if kept in self._models:
+            if kept in self.models:
                 self._choice.value = kept  # type: ignore[misc]
         self._choose()
 
     def _choose(self) -> None:
         """Makes sliders for the chosen model."""
         self._chosen = self._choice.value
-        model = self._models.get(self._chosen)
+        model = self.models.get(self._chosen)
         joints = list(model.joints) if model is not None else []
         self._joints.visible = bool(joints)
         for slider in self._sliders.values():
@@ -99,7 +101,7 @@ class ModelPanel:
             if event.client is not None:  # someone moved it
                 self._touched[joint.name] = time.monotonic()
                 self._wanted[model, joint.name] = float(slider.value)
-                self._attempt(lambda: self._move_newest(model, joint.name))
+                self.attempt(lambda: self._move_newest(model, joint.name))
 
         slider.on_update(moved)
         return slider
@@ -109,30 +111,29 @@ class ModelPanel:
         with self._turn:
             position = self._wanted.pop((model, joint), None)
             if position is not None:
-                self._move(model, joint, position)
+                self.move(model, {joint: position}, MOVE_TIME)
 
-    def _move(self, model: str, joint: str, position: float) -> None:
+    def move(self, model: str, goals: dict[str, float], seconds: float) -> None:
+        """Sends joints to positions [rad, m], trajectories in a time [s]; places them while time stands."""
+        self.sent |= goals
         if self._stands():
-            self._commands.place_joint(model, joint, position)
+            self._commands.place_joints(model, goals)
             return
-        holder = self._controllers.holder(joint)
-        if isinstance(holder, str):
-            raise ServiceFailed(f"{joint}: {holder}; it can be placed while time stands still")
-        drawn = self._models.get(model)
-        if drawn is None:
-            raise ServiceFailed(f"{model} is gone")
-        names = [each.name for each in drawn.joints]
-        positions = dict(zip(names, self._positions.get(model, []), strict=False))
-        self._controllers.command(holder, joint, positions | {joint: position})
+        for holder, joint in {self.controllers.holder(joint): joint for joint in goals}.items():
+            if isinstance(holder, str):
+                raise ServiceFailed(f"{joint}: {holder}; it can be placed while time stands still")
+            if model not in self.at:
+                raise ServiceFailed(f"{model} is gone")
+            self.controllers.command(holder, joint, self.at[model] | goals, seconds)
 
-    def show(self, links: dict[str, np.ndarray], positions: dict[str, list[float]]) -> None:
+    def show(self, links: dict[str, np.ndarray], positions: dict[str, dict[str, float]]) -> None:
         """Shows poses (n, 7) of links and positions [rad, m] of joints, both by model."""
         if self._choice.value != self._chosen:
             self._choose()
-        self._positions = positions
-        self._show_joints(positions.get(self._chosen, []))
+        self.at = positions
+        self._show_joints(positions.get(self._chosen, {}))
         rows = []
-        for name, model in list(self._models.items())[:MOST_SHOWN]:
+        for name, model in list(self.models.items())[:MOST_SHOWN]:
             if name in links:
                 x, y, z = model.pose(links[name]).position
                 follows = name == self._followed
@@ -141,17 +142,18 @@ class ModelPanel:
                     + "".join(f"<td align='right'>{each:.3f}</td>" for each in (x, y, z))
                     + "</tr>"
                 )
-        rest = len(self._models) - MOST_SHOWN
+        rest = len(self.models) - MOST_SHOWN
         more = f"<tr><td colspan='4'>and {rest} more</td></tr>" if rest > 0 else ""
         head = "<tr><th align='left'>model</th><th>x [m]</th><th>y [m]</th><th>z [m]</th></tr>"
         inner = f"{head}{''.join(rows)}{more}"
         self._list.content = f"<table style='width: 100%; padding: 0 0.8em'>{inner}</table>"
 
-    def _show_joints(self, positions: list[float]) -> None:
+    def _show_joints(self, positions: dict[str, float]) -> None:
         """Moves the sliders with their joints, but for those that someone has just moved."""
         now = time.monotonic()
         self._show_unmoved()
-        for (name, slider), position in zip(list(self._sliders.items()), positions, strict=False):
+        for name, slider in list(self._sliders.items()):
+            position = positions.get(name, math.nan)
             if not math.isfinite(position) or now - self._touched.get(name, -math.inf) < HANDS_OFF:
                 continue
             shown_at = min(max(position, slider.min), slider.max)
@@ -162,7 +164,7 @@ class ModelPanel:
         """Disables sliders that would move nothing, and says why."""
         reasons = {}
         for joint in self._sliders if not self._stands() else ():
-            holder = self._controllers.holder(joint)
+            holder = self.controllers.holder(joint)
             if isinstance(holder, str):
                 reasons[joint] = holder
         for joint, slider in self._sliders.items():
@@ -180,8 +182,8 @@ class ModelPanel:
 
         Moving all cameras instead would fight with browsers that meanwhile report where theirs were.
         """
-        moving = [each for each in self._models.values() if not each.static]
-        model = self._models.get(self._chosen, moving[0] if len(moving) == 1 else None)
+        moving = [each for each in self.models.values() if not each.static]
+        model = self.models.get(self._chosen, moving[0] if len(moving) == 1 else None)
         if not self._follow.value or model is None or model.name not in links:
             self._let_go()
             return
@@ -195,7 +197,7 @@ class ModelPanel:
 
     def _let_go(self) -> None:
         """Moves the world back, and all cameras with it, so that they see the same, if it is still there."""
-        way, is_there = -np.array(self._world.position), self._followed in self._models
+        way, is_there = -np.array(self._world.position), self._followed in self.models
         self._start, self._followed = None, ""
         if np.abs(way).max() > 0.0:
             self._world.position = (0.0, 0.0, 0.0)

@@ -162,10 +162,10 @@ class Controllers:
                     kind = each.type.rpartition("/")[2]
                     yield Holder(f"{space}{each.name}/command", kind, tuple(_claimed(each)))
 
-    def command(self, holder: Holder, joint: str, positions: dict[str, float]) -> None:
+    def command(self, holder: Holder, joint: str, positions: dict[str, float], seconds: float) -> None:
         """Sends `joint` to its position [rad, m] in `positions`, which has those of all other joints, too.
 
-        Raises ServiceFailed if the controller doesn't subscribe.
+        A trajectory takes `seconds` of simulated time. Raises ServiceFailed if no controller subscribes.
         """
         kind = KINDS.get(holder.kind)
         message = kind.message_type if kind else JointTrajectory
@@ -181,9 +181,7 @@ class Controllers:
         if kind is not None:
             publisher.publish(kind.write(positions[joint] if kind.single else targets))
         else:
-            point = JointTrajectoryPoint(
-                positions=targets, time_from_start=rospy.Duration.from_sec(MOVE_TIME)
-            )
+            point = JointTrajectoryPoint(positions=targets, time_from_start=rospy.Duration.from_sec(seconds))
             publisher.publish(JointTrajectory(joint_names=order, points=[point]))
 
 

@@ -142,6 +142,8 @@ class Commands:
         request = (now.time_step, rate, now.gravity, now.ode_config)
         self._call("set_physics_properties", srv.SetPhysicsProperties, *request)
 
-    def place_joint(self, model: str, joint: str, position: float) -> None:
-        """Puts a joint at `position` [rad, m], at rest."""
-        self._call("set_model_configuration", srv.SetModelConfiguration, model, "", [joint], [position])
+    def place_joints(self, model: str, goals: dict[str, float]) -> None:
+        """Puts joints at positions [rad, m], at rest."""
+        self._call(
+            "set_model_configuration", srv.SetModelConfiguration, model, "", [*goals], [*goals.values()]
+        )

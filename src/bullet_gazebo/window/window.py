@@ -71,7 +71,7 @@ class Window:
         with tabs.add_tab("Controllers"):
             self._tree = gui.add_html("")
         with tabs.add_tab("Drive"):
-            self._drive = DrivePanel(gui)
+            self._drive = DrivePanel(gui, self._models)
         with tabs.add_tab("Sensors"):
             self._sensors = SensorPanel(server, WORLD)
         for box in (self._collisions, self._joint_frames):
@@ -127,6 +127,7 @@ class Window:
             with self._server.atomic():
                 self._picture.move(np.array(poses.poses, dtype=float).reshape(-1, NUMBERS))
                 self._models.follow(self._picture.links)
+                self._models.at = self._picture.joints(poses.positions)
                 self._sensors.show(self._picture)
                 self._aim()
 
@@ -168,8 +169,8 @@ class Window:
     def _show_rest(self) -> None:
         if self._scene.is_live:
             self._time.show_speed()
-        self._drive.look()
         self._controllers.look()
+        self._drive.look()
         self._tree.content = self._controllers.as_html()
 
     def _screenshot(self, event: viser.GuiEvent[Any]) -> None:

@@ -171,13 +171,15 @@ def jacobian(
         linear[:, 3:6] = np.cross(np.eye(3), arm).T
     carriers = {joint.name for joint in model.carriers(link)}
     for column, joint in enumerate(joints, start=base):
-        if joint.name not in carriers:
-            continue
-        frame = poses[joint.child].compose(joint.anchor)
-        axis = np.array(rotate(frame.orientation, joint.axis))
-        if joint.kind == "prismatic":
-            linear[:, column] = axis
-        else:
-            linear[:, column] = np.cross(axis, point - np.array(frame.position))
-            angular[:, column] = axis
+        if joint.name in carriers:
+            linear[:, column], angular[:, column] = point_velocity(joint, poses[joint.child], point)
     return linear, angular
+
+
+def point_velocity(joint: Joint, child: Pose, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns linear and angular velocity (3,) of a `point` that the joint moves at unit speed."""
+    frame = child.compose(joint.anchor)
+    axis = np.array(rotate(frame.orientation, joint.axis))
+    if joint.kind == "prismatic":
+        return axis, np.zeros(3)
+    return np.cross(axis, point - np.array(frame.position)), axis

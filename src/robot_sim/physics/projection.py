@@ -6,6 +6,7 @@ projected onto the joints that carry the link, and the velocity onto their speed
 
 import numpy as np
 
+from robot_sim.physics.dynamics import jacobian
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import Pose, rotation, subtract
@@ -54,16 +55,10 @@ def _approach(model: Model, carriers: list[str], link: str, pose: Pose) -> float
 
 
 def _jacobian(model: Model, carriers: list[str], link: str) -> np.ndarray:
-    """Returns the link's velocity for unit speed of each carrier (6, n), exactly as the engine has it."""
-    speeds = [model.joint_state(name)[1] for name in carriers]
-    _speed_up(model, carriers, np.zeros(len(carriers)))
-    rest = np.array(sum(model.link_state(link)[1], ()))
-    columns = []
-    for column in np.eye(len(carriers)):
-        _speed_up(model, carriers, column)
-        columns.append(np.array(sum(model.link_state(link)[1], ())) - rest)
-    _speed_up(model, carriers, np.array(speeds))
-    return np.array(columns).T
+    """Returns the link's velocity for unit speed of each carrier (6, n)."""
+    joints = [model.description.joints[name] for name in carriers]
+    poses = model.poses_by_link()
+    return np.vstack(jacobian(model.description, joints, 0, poses, link, np.array(poses[link].position)))
 
 
 def _speed_up(model: Model, carriers: list[str], speeds: np.ndarray) -> None:

@@ -1,7 +1,6 @@
 """Models, lights and contacts as nodes of viser's web page; knows no ROS."""
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import islice
 
 import numpy as np
 import viser
@@ -133,10 +132,11 @@ class Picture:
                 found[model.name] = rows
         return found
 
-    def joints(self, positions: Sequence[float]) -> dict[str, list[float]]:
-        """Returns the positions [rad, m] of all joints by model."""
+    def joints(self, positions: Iterable[float]) -> dict[str, dict[str, float]]:
+        """Returns the positions [rad, m] of all joints by model and name."""
         left = iter(positions)
-        return {m.name: list(islice(left, len(m.joints))) for m in self.models.values()}
+        models = self.models.values()  # zip takes none too many of `left`, since that comes last
+        return {m.name: dict(zip([j.name for j in m.joints], left, strict=False)) for m in models}
 
     def touch(self, points: np.ndarray) -> None:
         """Shows contact points [m] (n, 3)."""

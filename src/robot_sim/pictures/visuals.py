@@ -1,13 +1,14 @@
 """The visible parts of models: their shapes as records for a page, and as triangles for a renderer."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from robot_sim.physics.description import Color, DescriptionError, Joint, Link, ModelDescription, Shape
+from robot_sim.physics.dynamics import link_poses
 from robot_sim.physics.files.meshes import read_look
 from robot_sim.physics.pose import Pose, rotate
 
@@ -22,7 +23,8 @@ class VisibleModel:
     """A model's links with their shapes, and its movable joints.
 
     `number` is unique: another model with its name has another number. `root` is the index of its root link,
-    `frame` the model's frame as seen from that link. A `static` one never moves.
+    `frame` the model's frame as seen from that link. A `static` one never moves. A joint's `parent` is the
+    child of the movable one above, or empty: then its `pose` is in the model.
     """
 
     number: int
@@ -32,6 +34,7 @@ class VisibleModel:
     root: int = 0
     frame: Pose = Pose()
     static: bool = False
+    tips: Mapping[str, Pose] = field(default_factory=dict)  # by joint: the farthest frame in its child
 
     def corners(self, links: np.ndarray) -> np.ndarray:
         """Returns box corners around its visuals (n, 3) [m], from the poses (m, 7) of its links."""
@@ -77,12 +80,26 @@ def visible_model(
     collisions: bool,
 ) -> VisibleModel:
     """Returns the visible parts of these links and joints, with collision shapes if `collisions`."""
+    chained, tips = _chained(description, joints)
     return VisibleModel(
-        number, name, [_link(description, each, collisions) for each in links],
-        [description.joints[each] for each in joints],
+        number, name, [_link(description, each, collisions) for each in links], chained,
         links.index(description.root) if description.root in links else 0,
-        description.root_pose.inverse(), description.static,
+        description.root_pose.inverse(), description.static, tips,
     )  # fmt: skip
+
+
+def _chained(model: ModelDescription, names: Sequence[str]) -> tuple[list[Joint], dict[str, Pose]]:
+    zero = link_poses(model, model.root_pose, {})
+    movers = {link: ["", *(each.child for each in model.carriers(link) if each.movable)] for link in zero}
+    frames = [*((link, Pose()) for link in zero), *model.lumped.values()]
+    joints, tips = [], {}
+    for joint in [model.joints[name] for name in names]:
+        parent, child, hinge = movers[joint.child][-2], zero[joint.child], joint.anchor.position
+        joints.append(replace(joint, parent=parent, pose=child.relative_to(zero.get(parent, Pose()))))
+        moved = [zero[link].compose(at) for link, at in frames if movers[link][-1] == joint.child]
+        ends = [each.relative_to(child) for each in moved]
+        _, tips[joint.name] = max((math.dist(each.position, hinge), each) for each in ends)
+    return joints, tips
 
 
 def _link(description: ModelDescription, name: str, collisions: bool) -> Link:

@@ -196,16 +196,13 @@ class Browser:
         found = f"e.innerText && e.innerText.trim() === {json.dumps(text)}"
         wait_for(lambda: self._press(found), f"element {text!r}")
 
-    def press_keys(self, selector, key, count):
-        """Presses a key some times on the first element of a CSS selector."""
-        self._press_keys(f"document.querySelector({json.dumps(selector)})", key, count)
+    def key(self, kind, key):
+        """Holds a letter's key, or lets it go: "keyDown" or "keyUp"."""
+        self._do("Input.dispatchKeyEvent", type=kind, key=key, code=f"Key{key.upper()}")
 
     def push_slider(self, label, key, count):
         """Presses a key some times on the slider beside a label."""
-        self._press_keys(self._slider(label), key, count)
-
-    def _press_keys(self, element, key, count):
-        """Presses a key on an element that JavaScript finds."""
+        element = self._slider(label)
         wait_for(lambda: self.run(f"!!{element} && ({element}.focus(), true)"), element)
         for _ in range(count):
             for kind in ("keyDown", "keyUp"):

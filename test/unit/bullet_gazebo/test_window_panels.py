@@ -90,7 +90,7 @@ def test_models_are_chosen_while_another_thread_shows_them(server, interleaved):
         stands = not stands
         at = 1.0 if stands else -1.0
         shown.release()
-        panel.show(picture.links, {name: [at] * len(each) for name, each in names.items()})
+        panel.show(picture.links, {name: dict.fromkeys(each, at) for name, each in names.items()})
         if stands:
             panel.set_models(models)
     for name in [*names, NONE]:
@@ -153,7 +153,8 @@ def test_foreign_names_and_numbers_are_only_text_to_a_browser(server):
     picture.move(at_rest(len(models)))
     panel.set_models(models)
     handles(server, viser.GuiDropdownHandle)["Model"].value = NAMES[0]
-    positions = {name: [1e300, 0.0, -1e20, float("nan"), 1e308, 0.0] for name in NAMES}
+    at = (1e300, 0.0, -1e20, float("nan"), 1e308, 0.0)
+    positions = dict.fromkeys(NAMES, dict(zip([each.name for each in joints], at, strict=True)))
     panel.show(picture.links, positions)
     with Browser(f"http://127.0.0.1:{server.get_port()}") as page:
         for name in NAMES:
@@ -181,7 +182,7 @@ def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
         def holder(self, joint):
             return self
 
-        def command(self, holder, joint, positions):
+        def command(self, holder, joint, positions, seconds):
             assert listens.wait(60.0)
             commanded.append(positions[joint])
 
@@ -190,7 +191,7 @@ def test_a_slider_that_is_dragged_leaves_its_joint_where_it_was_left(server):
     picture.draw([VisibleModel(1, "arm", [Link("base")], [joint("elbow")])], [])
     panel.set_models(list(picture.models.values()))
     handles(server, viser.GuiDropdownHandle)["Model"].value = "arm"
-    panel.show({}, {})
+    panel.show({}, {"arm": {"elbow": 0.0}})
     slider = handles(server, viser.GuiSliderHandle)["elbow"]
     (moved,) = slider._impl.update_cb
     somebody = viser.GuiEvent(client=object(), client_id=0, target=slider)

@@ -31,17 +31,14 @@ class DriveTest(WindowCase):
         page.wait_for_value(TOPIC)
         page.run("document.activeElement.blur()")
 
-    def key(self, page, kind, key):
-        page._do("Input.dispatchKeyEvent", type=kind, key=key, code=f"Key{key.upper()}")
-
     def test_held_keys_and_sticks_drive_until_they_are_let_go(self):
         self.open_tab(self.page)
-        self.key(self.page, "keyDown", "i")
+        self.page.key("keyDown", "i")
         self.hears(0.3, 0.0, 0.0)
-        self.key(self.page, "keyDown", "j")
+        self.page.key("keyDown", "j")
         self.hears(0.3, 0.0, 0.8)
         for key in "ij":
-            self.key(self.page, "keyUp", key)
+            self.page.key("keyUp", key)
         self.hears(0.0, 0.0, 0.0)
         self.page.run(PAD.format(0, 1))
         self.hears(-0.3, 0.0, 0.0)
@@ -52,7 +49,7 @@ class DriveTest(WindowCase):
         with Browser(shown().url) as page:
             page.wait_for_text("One step")
             self.open_tab(page)
-            self.key(page, "keyDown", "m")
+            page.key("keyDown", "m")
             self.hears(-0.3, 0.0, 0.0)
         self.hears(0.0, 0.0, 0.0)
         self.assertEqual([each for each in self.heard if each[0] > 0.0], [])

@@ -10,6 +10,7 @@ import numpy as np
 import rosgraph
 import rospy
 import rostest
+from arm_cases import ArmTest
 from drive_cases import DriveTest
 from gazebo_msgs.msg import ModelState
 from joints_cases import JointsTest
@@ -26,7 +27,7 @@ from robot_sim.pictures.camera import ASPECT, THIRD, overview
 from robot_sim.pictures.renderer import Renderer
 from robot_sim.pictures.visuals import visible_shapes
 
-__all__ = ["DriveTest", "JointsTest", "ShownRobotTest", "WindowTest"]
+__all__ = ["ArmTest", "DriveTest", "JointsTest", "ShownRobotTest", "WindowTest"]
 BALL = f"""<robot name="ball"><link name="ball">{INERTIAL}
 <visual><geometry><sphere radius="0.2"/></geometry>
   <material name="r"><color rgba="1 0 0 1"/></material></visual></link></robot>"""

@@ -49,10 +49,6 @@ class Hand:
         self._browser.__exit__(*fault)
 
 
-def key(page: Browser, kind: str, letter: str) -> None:
-    page._do("Input.dispatchKeyEvent", type=kind, key=letter, code=f"Key{letter.upper()}")
-
-
 def steps(page: Browser) -> int:
     return int(page.text.rpartition("step ")[2].partition(",")[0])
 
@@ -62,9 +58,9 @@ def steps(page: Browser) -> int:
 def test_held_keys_are_a_robots_action_and_undone_ones_were_never(tmp_path: Path) -> None:
     hand = Hand("robot_envs/PickCube-v0", max_steps=60)  # 3 s
     with hand as page:
-        key(page, "keyDown", "i")
+        page.key("keyDown", "i")
         wait_for(lambda: steps(page) > 5, "steps ahead")
-        key(page, "keyUp", "i")
+        page.key("keyUp", "i")
         page.run(PAD.format(1))  # the same way back
         page.wait_for_text("step 60, ")
         page.run(PAD.format(0))
@@ -87,9 +83,9 @@ def test_held_keys_are_a_robots_action_and_undone_ones_were_never(tmp_path: Path
 def test_a_choice_stays_until_the_next_and_an_end_waits_for_its_driver() -> None:
     hand = Hand("CartPole-v1")
     with hand as page:
-        key(page, "keyDown", "l")
+        page.key("keyDown", "l")
         page.wait_for_text("the episode has ended")
-        key(page, "keyUp", "l")
+        page.key("keyUp", "l")
         page.click("Keep")
     assert hand.episode is not None and hand.episode.terminated
     assert set(hand.episode.actions.tolist()) == {1}

@@ -76,9 +76,9 @@ def test_a_run_is_seen_and_played(start, tmp_path) -> None:
         page.wait_for_text("best, of step")
         pause(page)
         wait_for(lambda: is_seen(page, BLUE, ORANGE), "robot in 3-D")
-        page.press_keys("[role=slider]", "Home", 1)
+        page.push_slider("Step", "Home", 1)
         page.wait_for_text("step 0 of")
-        page.press_keys("[role=slider]", "ArrowRight", 3)
+        page.push_slider("Step", "ArrowRight", 3)
         page.wait_for_text("step 3 of")
         page.choose("1 ×", "0.1 ×")
         assert "step 3 of" in page.text, "it is paused"
