@@ -5,6 +5,7 @@ from difflib import get_close_matches
 
 MAX_ERROR = 4000  # characters
 MOST_COMPARED = 2000  # names; among more, the search for a similar one would take too long
+LONGEST_COMPARED = 200  # characters, for the same reason
 
 
 def one_line(text: str) -> str:
@@ -15,8 +16,9 @@ def one_line(text: str) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Returns the end of an error about an unknown name: the most similar known one, if there is one."""
-    names = sorted(set(known))
-    near = get_close_matches(name, names, 1) if len(names) <= MOST_COMPARED else []
+    names = sorted({each for each in known if len(each) <= LONGEST_COMPARED})
+    is_short = len(name) <= LONGEST_COMPARED and len(names) <= MOST_COMPARED
+    near = get_close_matches(name, names, 1) if is_short else []
     return f"; did you mean '{near[0]}'?" if near else ""
 
 

@@ -5,13 +5,15 @@ from typing import Any
 
 import gymnasium
 
+from file_access.text import one_line
 from robot_envs.errors import RestoreRefused, SimulatorError
 from robot_envs.pictures.drawn import DrawnEnv
 from robot_envs.snapshot import EnvSnapshot
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Sensor
-from robot_envs.world_state import WorldState
-from robot_sim.plain_data import misfit, resolve
+from robot_envs.world_state import Joints, WorldState
+from robot_sim.physics.engine import STRONGEST
+from robot_sim.plain_data import is_within, misfit, resolve
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import StateError, load, module_of, state_of, undoable
 
@@ -56,9 +58,35 @@ class SavedEnv(DrawnEnv):
 
         Raises:
             ValueError: If it is of an environment with another task, control period, or noise.
-            SimulatorError: If the world isn't that of the snapshot. Then nothing has changed, unless the
-                robots had to be varied: a reset comes next.
+            SimulatorError: If the world isn't that of the snapshot. Then nothing has changed.
         """
+        self.check_fits(snapshot)
+        is_foreign = snapshot.is_foreign
+        if not is_foreign and not self._differs(snapshot.state["variation"]):
+            self._load(snapshot)
+            return
+        before = None
+        with contextlib.suppress(SimulatorError, gymnasium.error.ResetNeeded):  # without an episode
+            before = self.save_state()
+        try:
+            if is_foreign:
+                state = resolve(snapshot.state)
+                self._check(state, before)
+                snapshot = EnvSnapshot(snapshot.fits, state, snapshot.world)
+            with undoable() if is_foreign else contextlib.nullcontext():
+                self._load(snapshot)
+        except BaseException as error:  # whatever a forged state leads to, and Ctrl-C
+            # A live one may be restored but for a user's class.
+            is_left = isinstance(error, RestoreRefused if is_foreign else SimulatorError)
+            if before is not None and not (is_left and self._steps is not None):
+                with contextlib.suppress(SimulatorError):  # a reset comes next
+                    self._load(before)
+            if isinstance(error, SimulatorError) or not isinstance(error, Exception):
+                raise
+            raise SimulatorError(one_line(f"the snapshot can't be restored: {error!s:.300}")) from error
+
+    def check_fits(self, snapshot: EnvSnapshot) -> None:
+        """Raises ValueError if it is of an environment with another task, control period, or noise."""
         self._check_open()
         if not isinstance(snapshot, EnvSnapshot):
             raise ValueError(f"it isn't a snapshot of an environment: {snapshot!r:.100}")
@@ -69,30 +97,29 @@ class SavedEnv(DrawnEnv):
                 f"the snapshot is of another environment: its {name} is {given.get(name)!r:.100}, not "
                 f"{here.get(name)!r}"
             )
-        if not snapshot.is_foreign:
-            self._load(snapshot)
-            return
-        before = None
-        with contextlib.suppress(SimulatorError, gymnasium.error.ResetNeeded):  # without an episode
-            before = self.save_state()
-        try:
-            state = resolve(snapshot.state)
-            if before and (fault := misfit(before.state, state)):
-                raise SimulatorError(f"the snapshot can't be restored: {fault}")
-            with undoable():
-                self._load(EnvSnapshot(snapshot.fits, state, snapshot.world))
-        except Exception as error:  # whatever a forged state leads to
-            is_as_before = isinstance(error, RestoreRefused) and self._steps is not None
-            if before is not None and not is_as_before:
-                with contextlib.suppress(SimulatorError):  # a reset comes next
-                    self._load(before)
-            if isinstance(error, SimulatorError):
-                raise
-            raise SimulatorError(f"the snapshot can't be restored: {error!s:.300}") from error
+
+    def _check(self, state: dict[str, Any], before: EnvSnapshot | None) -> None:
+        """Checks a foreign state, but for attributes of a user's classes: they may be of any type."""
+        there = {
+            "state": WorldState(0.0, Joints()), "first": {}, "steps": 0, "parts": {}, "lent": [],
+            "variation": self._variation, "initial": self._initial, **(before.state if before else {}),
+        }  # fmt: skip
+        users = "task", "randomisation"
+        there["parts"] = {name: each for name, each in there["parts"].items() if name not in users}
+        if fault := misfit(there, state):
+            raise SnapshotError(fault)
+        if (state["steps"] or 0) < 0:
+            raise SnapshotError(f"steps is {state['steps']}")
+        self._check_beginning(state)
+
+    def _check_beginning(self, state: dict[str, Any]) -> None:
+        if not is_within(vars(state["variation"]), STRONGEST):
+            raise SnapshotError("a number of the variation is too large, or NaN")
+        self.scene.commands(state["first"])
 
     def _load(self, snapshot: EnvSnapshot) -> None:
-        state = snapshot.state
-        is_varied = state["variation"] != self._variation
+        state, variation = snapshot.state, self._variation
+        is_varied = self._differs(state["variation"])
         steps = None if is_varied or self._begun else self._steps
         self._steps = self._begun = None
         if is_varied:
@@ -100,10 +127,12 @@ class SavedEnv(DrawnEnv):
         try:
             fault = self.backend.restore_state(snapshot.world)  # of a class; all else is restored
         except RestoreRefused:
+            if is_varied:
+                self._vary(variation)
             self._steps = steps
             raise
         self._state, self._first, self._initial = state["state"], state["first"], state["initial"]
-        self._steps, parts = state["steps"], state["parts"]
+        parts = state["parts"]
         try:
             load((part, parts[name]) for name, part in self._parts().items())
         except StateError as error:
@@ -111,6 +140,7 @@ class SavedEnv(DrawnEnv):
         for name in state["lent"]:
             if name in parts["task"]:
                 setattr(self.task, name, self.np_random)
+        self._steps = state["steps"]  # last: what Ctrl-C has left half restored needs a reset
         self._show()
         if fault:
             raise SimulatorError(fault)
@@ -122,14 +152,16 @@ class SavedEnv(DrawnEnv):
             given = resolve({name: snapshot.state[name] for name in here})
             if fault := misfit(here, given):
                 raise SnapshotError(fault)
-            if given["variation"] != self._variation:
+            self._check_beginning(given)
+            if self._differs(given["variation"]):
                 self._vary(given["variation"])
+            begun = self.backend.begin_at(snapshot.world, seed)
             self._first, self._initial = given["first"], given["initial"]
-            return self.backend.begin_at(snapshot.world, seed)
+            return begun
         except SimulatorError:
             raise
         except Exception as error:  # whatever a forged state leads to
-            raise SimulatorError(f"no episode can begin at the snapshot: {error!s:.300}") from error
+            raise SimulatorError(one_line(f"no episode can begin at the snapshot: {error!s:.300}")) from error
 
     def _parts(self) -> dict[str, Any]:
         """Returns everything with a state, except the world, by name."""
@@ -152,10 +184,18 @@ class SavedEnv(DrawnEnv):
             fits |= part.settings if part is not None else {}
         return fits
 
+    def _differs(self, variation: Variation) -> bool:
+        return variation is not self._variation and variation != self._variation  # mostly it is the same one
+
     def _vary(self, variation: Variation) -> None:
         changed = self._variation.undone.merged(variation)  # what it doesn't name is nominal again
+        try:
+            self.backend.vary(changed)
+        except BaseException:
+            with contextlib.suppress(Exception):  # an unknown name, or another type: nothing was varied
+                self.backend.vary(changed.undone.merged(self._variation))
+            raise
         self._variation = variation
-        self.backend.vary(changed)
 
     def _check_open(self) -> None:
         if self._closed:

@@ -1,6 +1,6 @@
 """The snapshot of an environment, its file, and snapshots where episodes begin."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -119,8 +119,8 @@ def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
     return [*differences(one.fits, other.fits), *differences(one.state, other.state)]
 
 
-def whole_of(state: WorldSnapshot) -> tuple[Snapshot, int, dict[str, Any]]:
-    """Returns a snapshot, when its episode has begun [ns], and what controllers hold there.
+def whole_of(state: WorldSnapshot, controllers: Mapping[str, Any]) -> tuple[Snapshot, int, dict[str, Any]]:
+    """Returns a snapshot, when its episode has begun [ns], and what the controllers hold there.
 
     Raises RestoreRefused if it can't be had, or is of no episode.
     """
@@ -131,6 +131,6 @@ def whole_of(state: WorldSnapshot) -> tuple[Snapshot, int, dict[str, Any]]:
     episode = whole.state.get("episode")
     if isinstance(episode, dict):
         begun, held = episode.get("begun"), episode.get("held")
-        if type(begun) is int and isinstance(held, dict):
+        if type(begun) is int and isinstance(held, dict) and held.keys() == controllers.keys():
             return whole, begun, held
     raise RestoreRefused("the snapshot is of no episode of an environment")

@@ -132,6 +132,8 @@ class RobotVectorEnv(SyncVectorEnv):  # generic since Gymnasium 1.4 only
         """Returns to a snapshot of this vector; see `RobotEnv.restore_state`."""
         if not isinstance(snapshot, VectorSnapshot) or len(snapshot.states) != self.num_envs:
             raise ValueError(f"it is no snapshot of a vector of {self.num_envs} environments")
+        for robot, state in zip(self._robots, snapshot.states, strict=True):
+            robot.check_fits(state)
         self._interrupted = True
         for robot, state in zip(self._robots, snapshot.states, strict=True):
             robot.restore_state(state)

@@ -1,15 +1,18 @@
 """Fingerprints of worlds: whether a snapshot fits."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import PurePath
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
+from robot_sim.physics.model import NO_STOP
+from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
-from robot_sim.plain_data import is_finite, misfit
+from robot_sim.plain_data import entries_of, is_within, misfit
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import Shared, Stateful
@@ -20,6 +23,7 @@ LEFT_OUT: Mapping[type, frozenset[str]] = {
     Link: frozenset(("inertia", "gravity")),
     Joint: frozenset(("kind", "lower", "upper", "damping")),
 }
+OFF_LENGTH = 1e-3  # of a unit quaternion
 
 
 def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, Any]:
@@ -84,13 +88,18 @@ def check_foreign(
     """
     pairs = zip(robots, before["robots"], state["robots"], strict=True)
     faults = [misfit({**before, "robots": [_known(*each) for each in pairs]}, state)]
-    if not all(is_finite(own["motion"]) for own in state["world"]["models"].values()):
-        faults.append("positions or velocities aren't finite")
+    physics = [state["world"], state["applied"], [each["efforts"] for each in state["robots"]]]
+    if not is_within(physics, NO_STOP):
+        faults.append("positions, velocities, forces or efforts are too large, or NaN")
+    turns = [each.orientation for each in entries_of(physics) if isinstance(each, Pose)]
+    if not all(abs(math.hypot(*turn) - 1.0) < OFF_LENGTH for turn in turns):  # PyBullet wouldn't recover
+        faults.append("an orientation's length isn't 1")
     there = set(state["world"]["models"])
     faults += [f"it lacks '{each}'" for each in state["world"]["order"] if each not in there]
     for robot, one, other in zip(robots, before["robots"], state["robots"], strict=True):
         faults.append(misfit(_needed(one), _needed(other), robot.model.name, exactly=True))
-        if not faults[-1] and _absent(one) != _absent(other):
+        absent, others = ([*_absent([each["hardware"], each["efforts"]])] for each in (one, other))
+        if not faults[-1] and absent != others:
             faults.append(f"numbers of {robot.model.name}'s joints are missing")
     for name, part in parts.items():
         if name in state["parts"] and isinstance(part, (Shared, Stateful)):
@@ -116,11 +125,14 @@ def _needed(robot: Mapping[str, Any]) -> dict[str, Any]:
     return {"hardware": robot["hardware"], "efforts": robot["efforts"], "pids": pids}
 
 
-def _absent(robot: Mapping[str, Any]) -> list[list[Any]]:
-    """Returns what of joints, drives and efforts is None; limiters begin with it."""
-    joints, drives = (robot["hardware"][name].values() for name in ("joints", "drives"))
-    tables = [*joints, *drives, dict(enumerate(robot["efforts"]))]
-    return [[name for name, each in table.items() if each is None] for table in tables]
+def _absent(value: Any, place: str = "") -> Iterator[str]:
+    """Yields the places of None, apart from limiters' last commands, which begin with it."""
+    if isinstance(value, (list, tuple)):
+        value = dict(enumerate(value))
+    for name, each in value.items() if isinstance(value, dict) else ():
+        if each is None and name != "_last":
+            yield f"{place}/{name}"
+        yield from _absent(each, f"{place}/{name}")
 
 
 def _digest(value: Any) -> str:

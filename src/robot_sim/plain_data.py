@@ -19,6 +19,8 @@ from robot_sim.state_dict import ATOMS, NUMBERS_AND_TEXTS, Held, StateError, fie
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
+OF_A_DEQUE = 16  # entries that an empty one counts as; it takes 760 bytes
+MOST_COPIED, TIMES = 2**24, 8  # [bytes], and of all bytes: what extensions within others may copy
 ALIKE = 100  # keys of a dictionary with the same hash: finding one takes longer with each
 TUPLE, ARRAY, SCALAR, RECORD, DEQUE, INTEGER = range(1, 7)  # codes of MessagePack's extensions
 LARGEST = 2**63  # what counts nanoseconds stays below
@@ -63,7 +65,7 @@ def unpack(data: bytes) -> Any:
     Raises:
         StateError: If they are damaged, or refer to a class that isn't imported.
     """
-    value = _unpack(data, 0, Counter())
+    value = _unpack(data, 0, Counter(room=max(MOST_COPIED, TIMES * len(data))))
     _check_depth(value)
     return value
 
@@ -75,13 +77,13 @@ def resolve(value: Any) -> Any:
         StateError: If a class is still unknown.
     """
     resolved = unpack(pack(value))
-    for entry in _entries(resolved):
+    for entry in entries_of(resolved):
         if isinstance(entry, Record):
             raise StateError(f"there is no class {f'{entry.module}.{entry.name}'!r:.300}")
     return resolved
 
 
-def _entries(value: Any) -> Iterator[Any]:
+def entries_of(value: Any) -> Iterator[Any]:
     """Yields a value and all that is in it, level by level.
 
     Raises:
@@ -97,7 +99,7 @@ def _entries(value: Any) -> Iterator[Any]:
 
 
 def _check_depth(value: Any) -> None:
-    for _ in _entries(value):  # raises
+    for _ in entries_of(value):  # raises
         pass
 
 
@@ -156,8 +158,8 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
 
     longest = min(MOST, len(data))  # lists are made as long as they say
 
-    def counted(entries: list[Any]) -> list[Any]:
-        count["entries"] += len(entries)
+    def counted(entries: list[Any], besides: int = 0) -> list[Any]:
+        count["entries"] += len(entries) + besides
         if count["entries"] > MOST:
             raise StateError(f"it has more than {MOST} entries")
         return entries
@@ -173,6 +175,9 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
     def extension(code: int, content: bytes) -> Any:
         if code == INTEGER and len(content) <= LONGEST_INTEGER:
             return int.from_bytes(content, "little", signed=True)
+        count["room"] -= len(content)
+        if count["room"] < 0:
+            raise StateError("it has too much in extensions within others")
         given = _unpack(content, depth + 1, count)
         if code == TUPLE:
             return tuple(given)
@@ -186,7 +191,7 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
             return np.frombuffer(number, _dtype(dtype), 1)[0]
         if code == DEQUE:
             most, entries = given
-            return deque(entries, most)
+            return deque(counted(entries, OF_A_DEQUE), most)
         if code == RECORD:
             return _record(*given)
         raise StateError(f"it has an extension {code}")
@@ -248,15 +253,15 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         exactly: Whether names and lengths have to be the same, too.
     """
     is_held = exactly and isinstance(there, Held)
-    if there is None or (given is None and not (is_held or _refers(there))):
-        return ""
     there, given = (each.item() if isinstance(each, np.generic) else each for each in (there, given))
     numbers = (int, float)
+    if _is_odd(given) and (isinstance(there, int) or (exactly and not _is_odd(there))):
+        return f"{place} is {given}"
+    if there is None or (given is None and not (is_held or _refers(there))):
+        return ""
     if type(there) in numbers and type(given) in numbers:
-        is_number = math.isfinite(given) if isinstance(there, int) else True
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers
-        is_small = is_number and not (counts and abs(given) >= LARGEST)
-        return "" if is_small else f"{place} is {given}"
+        return f"{place} is {given}" if counts and abs(given) >= LARGEST else ""
     both = type(there), type(given)
     if both[0] is not both[1] and set(both) != {list, tuple}:
         return f"{place} is a {type(given).__name__}, not a {type(there).__name__}"
@@ -287,6 +292,10 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     return next(filter(None, found), "")
 
 
+def _is_odd(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
+
+
 def _refers(value: Any) -> bool:
     """Returns whether it refers to what others save, such as joints, which can't be found again."""
     if isinstance(value, Held):
@@ -295,11 +304,12 @@ def _refers(value: Any) -> bool:
     return isinstance(value, (list, tuple, dict)) and any(map(_refers, values))
 
 
-def is_finite(value: Any) -> bool:
-    """Returns whether all numbers of plain data are finite."""
-    if isinstance(value, (list, tuple)):
-        return all(map(is_finite, value))
-    return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())
+def is_within(value: Any, most: float) -> bool:
+    """Returns whether no number of plain data is beyond `most`, or NaN."""
+    if isinstance(value, (list, tuple, dict)):
+        entries = value.values() if isinstance(value, dict) else value
+        return all(is_within(each, most) for each in entries)
+    return not isinstance(value, (float, np.ndarray)) or bool(np.all(np.abs(value) <= most))
 
 
 def differences(first: Any, second: Any, place: str = "") -> Iterator[Difference]:

@@ -6,6 +6,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from file_access.text import one_line
 from robot_sim.applied_forces import AppliedForces
 from robot_sim.constants import NANOSECONDS
 from robot_sim.fingerprint import check_foreign, fingerprint, misfits
@@ -303,9 +304,11 @@ class Simulator(Shared):
             self.world.check_state(state["world"])
             with undoable():
                 self._load(state)
-        except Exception as error:  # whatever a forged state raises
+        except BaseException as error:  # whatever a forged state raises, and Ctrl-C
             self._load(before)
-            raise SnapshotError(f"the snapshot can't be restored: {error!s:.300}") from error
+            if not isinstance(error, Exception):
+                raise
+            raise SnapshotError(one_line(f"the snapshot can't be restored: {error!s:.300}")) from error
 
     def _load(self, state: Mapping[str, Any]) -> None:
         self.world.load_state_dict(state["world"])

@@ -1,17 +1,22 @@
 """The snapshot of a simulation: its state, what it fits, and its file."""
 
 import hashlib
+import os
+import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from file_access.content import FileError, read_file
-from robot_sim.plain_data import pack, unpack
+from robot_sim.plain_data import entries_of, pack, unpack
 from robot_sim.state_dict import StateError
 
 MAGIC = b"robot snapshot 1\n"
 DIGEST = 32  # [bytes], of SHA-256
 LARGEST = 256 * 2**20  # [bytes] of a file
+SURELY_READ = 2**16  # [bytes]; what has no more can't exceed the limits of `unpack`
 
 
 class SnapshotError(ValueError):
@@ -40,9 +45,13 @@ class Snapshot:
         """Returns it as bytes, of this version of the format.
 
         Raises:
-            StateError: If something in it isn't plain data.
+            StateError: If something in it isn't plain data, or more than could be read again.
         """
         content = pack([self.fits, self.state])
+        if len(content) > LARGEST - len(MAGIC) - DIGEST:
+            raise StateError(f"a snapshot has at most {LARGEST // 2**20} MiB")
+        if len(content) > SURELY_READ:
+            unpack(content)
         return MAGIC + hashlib.sha256(content).digest() + content
 
     @classmethod
@@ -64,16 +73,25 @@ class Snapshot:
             raise SnapshotError(f"the snapshot can't be read: {error}") from error
         if not (isinstance(fits, dict) and isinstance(state, dict)):
             raise SnapshotError("the snapshot can't be read: it isn't made of names and states")
+        if any(isinstance(each, np.ndarray) for each in entries_of(fits)):  # which == can't compare
+            raise SnapshotError("the snapshot can't be read: there is an array in what it fits")
         return cls(fits, state, is_foreign=True)
 
     def save(self, path: Path | str) -> None:
         """Writes it to a file.
 
         Raises:
-            StateError: If something in it isn't plain data.
-            OSError: If the file can't be written.
+            StateError: See `to_bytes`.
+            OSError: If the file can't be written; an older one stays.
         """
-        Path(path).write_bytes(self.to_bytes())
+        path = Path(path)
+        temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+        try:
+            temporary.write_bytes(self.to_bytes())
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

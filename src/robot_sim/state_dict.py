@@ -35,6 +35,8 @@ BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
 
 # Objects that loads within `undoable` have changed, with the attributes that they had.
 _CHANGED: ContextVar[list[tuple[Any, dict[str, Any]]] | None] = ContextVar("_CHANGED", default=None)
+Taken = dict[int, tuple[Any, Any]]
+"""Objects and generators that a load has given a state, each with that state, by their id."""
 
 
 class StateError(TypeError):
@@ -99,17 +101,18 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
         StateError: If one can't take its state.
     """
     faults = []
+    taken: Taken = {}
     for part, state in parts:
         try:
             takes = getattr(type(part), "load_state_dict", None)
             if takes is Stateful.load_state_dict:
-                put_attributes(part, state)
+                put_attributes(part, state, taken)
             elif takes is not None:
                 part.load_state_dict(_saved(state))  # a copy: it may keep what it gets
             elif isinstance(part, GENERATORS):
-                _put_generator(part, state)
+                _put_generator(part, state, taken)
             elif not isinstance(part, Shared):
-                put_attributes(part, state)
+                put_attributes(part, state, taken)
         except StateError as error:
             faults.append(str(error))
         except Exception as error:  # noqa: BLE001 - a user's code
@@ -170,8 +173,8 @@ def attributes_of(part: Any) -> dict[str, Any]:
     return state
 
 
-def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
-    """Gives an object the attributes that `attributes_of` has returned; what has come since goes."""
+def put_attributes(part: Any, state: Mapping[str, Any], taken: Taken | None = None) -> None:
+    """Gives an object what `attributes_of` has returned; what has come since goes. `taken`: see `Taken`."""
     kind: Any = type(part)
     slots, left = _layout(kind)
     own = getattr(part, "__dict__", {})
@@ -181,9 +184,13 @@ def put_attributes(part: Any, state: Mapping[str, Any]) -> None:
     faults = []
     for name, saved in state.items():
         value = saved
-        if type(saved) not in ATOMS:
+        if type(saved) in ATOMS:
+            if name in own:  # most are
+                own[name] = saved
+                continue
+        else:
             try:
-                value = _loaded(held.get(name), saved)
+                value = _loaded(held.get(name), saved, taken)
             except StateError as error:  # the rest is put back
                 faults.append(f"{kind.__qualname__}.{name}: {error}")
                 continue
@@ -322,7 +329,7 @@ def _takes(kind: Hashable) -> Any:
     return _nothing if issubclass(kind, Shared) else getattr(kind, "load_state_dict", None)  # type: ignore[arg-type]
 
 
-def _loaded(current: Any, saved: Any) -> Any:
+def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
     """Returns the saved value, with the current one's objects kept and loaded in place."""
     kind: Any = type(saved)
     if kind in ATOMS:
@@ -331,19 +338,21 @@ def _loaded(current: Any, saved: Any) -> Any:
         own: Any = type(current)
         if own.__qualname__ != saved.kind or (takes := _takes(own)) is None:
             raise StateError(f"there is no {saved.kind:.100} here to take the state of one")
+        if takes is not _nothing and _has_taken(current, saved.state, taken):
+            raise StateError(f"this {saved.kind:.100} is in two places, with another state in each")
         if takes is Stateful.load_state_dict:
-            put_attributes(current, saved.state)
+            put_attributes(current, saved.state, taken)
         elif takes is not _nothing:
             load([(current, saved.state)])
         return current
     if kind is list or kind is tuple:
         there = current if isinstance(current, (list, tuple)) else ()
-        return kind([_loaded(each, own) for own, each in zip_longest(saved, there[: len(saved)])])
+        return kind([_loaded(each, own, taken) for own, each in zip_longest(saved, there[: len(saved)])])
     if kind is dict:
         if GENERATOR in saved:
-            return _put_generator(current, saved)
+            return _put_generator(current, saved, taken)
         known = current if type(current) in (dict, defaultdict) else {}
-        entries = {key: _loaded(known.get(key), each) for key, each in saved.items()}
+        entries = {key: _loaded(known.get(key), each, taken) for key, each in saved.items()}
         if type(current) is defaultdict:
             return defaultdict(current.default_factory, entries)
         return entries
@@ -351,13 +360,35 @@ def _loaded(current: Any, saved: Any) -> Any:
         return _saved(saved)
     if kind is deque:
         there = [*current] if isinstance(current, deque) else ()
-        return deque(_loaded(there, [*saved]), saved.maxlen)
+        return deque(_loaded(there, [*saved], taken), saved.maxlen)
     return _saved(saved)
 
 
-def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
-    """Loads a generator's state into the current one, or into a new one if their kinds differ."""
+def _has_taken(part: Any, state: Any, taken: Taken | None) -> bool:
+    """Returns whether an object has taken another state; otherwise it takes this one."""
+    return taken is not None and not _alike(taken.setdefault(id(part), (part, state))[1], state)
+
+
+def _alike(one: Any, other: Any) -> bool:
+    if one is other:
+        return True
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_alike(one[key], other[key]) for key in one)
+    if isinstance(one, (list, tuple, deque)) and isinstance(other, (list, tuple, deque)):
+        return len(one) == len(other) and all(map(_alike, one, other))
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return one.shape == other.shape and one.tobytes() == other.tobytes()
+    return repr(one) == repr(other)  # so is NaN
+
+
+def _put_generator(current: Any, saved: Mapping[str, Any], taken: Taken | None) -> Any:
+    """Loads a generator's state into the current one, or into a new one.
+
+    It is a new one if their kinds differ, or if the current one has taken another state.
+    """
     kind, state = saved[GENERATOR], saved["state"]
+    if (isinstance(current, GENERATORS) or _is_torchs(current)) and _has_taken(current, saved, taken):
+        current = None
     if kind not in ("torch", "Random", *BIT_GENERATORS):
         raise StateError(f"there is no generator of type {kind!r:.100}")
     target: Any
@@ -380,8 +411,8 @@ def _put_generator(current: Any, saved: Mapping[str, Any]) -> Any:
         bits.state = checked_bits(state)
         return target
     entropy, spawn_key, pool_size, spawned = seeds
-    if pool_size > LARGEST_POOL:
-        raise StateError(f"there is no seed sequence with a pool of {pool_size}")
+    if pool_size > LARGEST_POOL or len(spawn_key) > LARGEST_POOL:
+        raise StateError(f"there is no seed sequence with a pool of {pool_size} and {len(spawn_key)} parents")
     again = np.random.SeedSequence(
         entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
     )

@@ -23,7 +23,8 @@ from robot_sim.simulator import Simulator
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import StateError, checked_bits
 
-MOST = 1000  # names
+MOST = 1000  # states; then the oldest one goes, since clients may end without forgetting theirs
+LONGEST = 200  # characters of a name
 
 
 class GlobalGenerators:
@@ -38,6 +39,11 @@ class GlobalGenerators:
         version, words, gauss = state["python"]
         random.setstate((version, tuple(words.tolist()), gauss))
         np.random.set_state(dict(checked_bits(state["numpy"])))
+
+
+def _check_name(name: str) -> None:
+    if len(name) > LONGEST:
+        raise ServiceRefused(f"a state's name has at most {LONGEST} characters, not {len(name)}")
 
 
 class SnapshotServices:
@@ -59,15 +65,15 @@ class SnapshotServices:
         ]
 
     def _save(self, request: SaveStateRequest) -> SaveStateResponse:
+        _check_name(request.name)
         with self._one_at_a_time, self._sim.lock:
             for name in request.forget:
                 self._kept.pop(name, None)
             done = "nothing saved, without a name"
             if request.name:
-                self._check_room(request.name)
                 self._sim.await_holds()
                 try:
-                    self._kept[request.name] = self._sim.save_state()
+                    self._keep(request.name)
                 except StateError as error:
                     raise ServiceRefused(str(error)) from error
                 done = "state saved"
@@ -78,28 +84,34 @@ class SnapshotServices:
             raise ServiceRefused(str(error)) from error
         return SaveStateResponse(True, f"SaveState: {done}", data)
 
-    def _check_room(self, name: str) -> None:
-        if len(self._kept) >= MOST and name not in self._kept:
-            raise ServiceRefused(f"{MOST} states are kept already: name some that are to be forgotten")
+    def _keep(self, name: str) -> None:
+        state = self._sim.save_state()
+        self._kept.pop(name, None)
+        self._kept[name] = state
+        if len(self._kept) > MOST:
+            del self._kept[next(iter(self._kept))]
 
     def _find(self, name: str) -> Snapshot:
         if name not in self._kept:
             raise ServiceRefused(
-                f"no state '{name}' is kept{did_you_mean(name, self._kept)}; it was forgotten, or never "
-                "saved in this simulator"
+                f"no state '{name:.{LONGEST}}' is kept{did_you_mean(name, self._kept)}; it was forgotten, "
+                f"discarded as the oldest of {MOST}, or never saved in this simulator"
             )
         return self._kept[name]
 
     def _restore(self, request: RestoreStateRequest) -> RestoreStateResponse:
+        _check_name(request.name)
+        try:  # before it takes the lock: it may be long
+            read = Snapshot.from_bytes(request.data) if request.data else None
+        except SnapshotError as error:
+            raise ServiceRefused(str(error)) from error
         with self._one_at_a_time, self._sim.lock:
-            if request.data and request.name:
-                self._check_room(request.name)
             try:
-                given = Snapshot.from_bytes(request.data) if request.data else self._find(request.name)
+                given = read or self._find(request.name)
                 self._sim.await_holds()
                 self._sim.restore_state(given)
-                if request.data and request.name:  # without what the data had beyond a state
-                    self._kept[request.name] = self._sim.save_state()
+                if read and request.name:  # without what the data had beyond a state
+                    self._keep(request.name)
             except SnapshotError as error:
                 raise ServiceRefused(str(error)) from error
             except StateError as error:

@@ -255,7 +255,7 @@ class InProcessWorld(RobotBackend):
         return snapshot
 
     def restore_state(self, state: WorldSnapshot) -> str:
-        (snapshot, begun, held), fault = whole_of(state), ""
+        (snapshot, begun, held), fault = whole_of(state, self.scene.ports), ""
         try:
             self._sim.restore_state(snapshot)
         except SnapshotError as error:

@@ -6,13 +6,12 @@ from pathlib import Path
 PAGE = Path(__file__).resolve().parents[3] / "docs/snapshots.md"
 
 
-def test_its_programs_run(tmp_path, monkeypatch, capsys):
+def test_its_programs_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     known = {}
     text = PAGE.read_text(encoding="utf-8")
     for program in re.findall(r"^```python\n(.*?)^```", text, re.M | re.S):
         exec(program, known)
     assert repr(known["first"]) == repr(known["again"]) and (tmp_path / "hard.snapshot").exists()
-    assert "environment/steps: 0 and 1" in capsys.readouterr().out
     starts = {known["env"].reset(seed=seed)[0].tobytes() for seed in range(8)}
     assert len(starts) > 1

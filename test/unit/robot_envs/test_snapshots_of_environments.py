@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import replace
+from unittest.mock import Mock
 
 import gymnasium
 import numpy as np
@@ -385,6 +386,15 @@ def test_where_a_controller_cannot_load_its_state_all_else_is_restored(begun, mo
     assert len(env.task.seen) == 7 and env.state == state
     env.step(0)
     assert env.state.time == pytest.approx(state.time + env.control_period)
+
+
+def test_ctrl_c_in_the_middle_leaves_nothing_but_a_reset(begun, monkeypatch):
+    env = begun()
+    monkeypatch.setattr("robot_envs.restoring.load", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        env.restore_state(env.save_state())
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(1)
 
 
 def test_an_episode_beyond_its_last_step_is_truncated(made, begun):

@@ -1,6 +1,7 @@
 """Plain data as bytes: what comes back, and what damaged, forged and endless input leads to."""
 
 import itertools
+import math
 import random
 import struct
 import sys
@@ -156,11 +157,21 @@ def test_entries_have_an_end_also_those_within_others(monkeypatch):
         unpack(pack(value))
 
 
-def nested(depth):
-    value = b"\xc0"
+def nested(depth, content=None):
+    """A content in tuples, each within another one."""
+    value = pack(content)
     for _ in range(depth):
         value = b"\xc9" + struct.pack(">IB", len(value) + 1, 1) + b"\x91" + value
     return value
+
+
+@pytest.mark.parametrize("value", [[deque()] * 100, nested(90, bytes(10_000))], ids=("deques", "copies"))
+def test_memory_has_an_end_also_for_what_takes_few_bytes(value, monkeypatch):
+    monkeypatch.setattr("robot_sim.plain_data.MOST", 1000)
+    monkeypatch.setattr("robot_sim.plain_data.MOST_COPIED", 1000)
+    assert unpack(pack([deque()] * 50)) and unpack(nested(3, bytes(10_000)))
+    with pytest.raises(StateError, match="more than 1000 entries|too much in extensions"):
+        unpack(value if isinstance(value, bytes) else pack(value))
 
 
 def test_nesting_has_an_end_where_it_is_read_and_where_it_is_written():
@@ -217,5 +228,6 @@ def test_what_takes_the_place_of_what():
     three, five = np.zeros(3), np.zeros(5)
     assert misfit(three, five) == ""
     assert misfit(three, five, "efforts", exactly=True).startswith("efforts is an array")
+    assert misfit([math.inf, 1.0], [math.inf, math.nan], exactly=True) == "1 is nan"
     assert misfit((1.0, [2]), (np.float64(3.0), [np.int32(4)])) == ""
     assert misfit({"a": np.float64(1.0)}, {"a": "x"}) == "a is a str, not a float"

@@ -207,6 +207,25 @@ def test_a_generator_spawns_the_same_again():
         assert [each.random() for _ in range(2) for each in generator.spawn(2)] == spawned
 
 
+def test_what_was_in_two_places_never_takes_the_state_of_another():
+    for number in range(3):
+        part = Part(train=np.random.default_rng(0), eval=np.random.default_rng(1))
+        part.now = (part.train, part.eval, np.random.default_rng(2))[number]
+        state = unpack(pack(state_of(part)))
+        part.now = part.eval if number != 1 else part.train
+        load([(part, state)])
+        drawn = [each.random() for each in (part.train, part.eval, part.now)]
+        assert drawn == [np.random.default_rng(each).random() for each in (0, 1, number)]
+    gears = Part(low=Part(x=np.ones(2)), high=Part(x=9))
+    gears.now = gears.low
+    state = state_of(gears)
+    load([(gears, state)])
+    gears.now = gears.high
+    with pytest.raises(StateError, match=r"^Part\.now: this Part is in two places"):
+        load([(gears, state)])
+    assert gears.high.x == 9
+
+
 def test_a_class_may_say_itself_what_counts_and_what_it_does_with_it_leaves_the_snapshot():
     class Keeping:
         """Keeps the very list that it gets."""

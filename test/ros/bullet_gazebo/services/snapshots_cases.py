@@ -135,18 +135,17 @@ class SnapshotsTest(LockstepCase):
                 self.assertEqual(measured(), first)
 
     def test_states_are_bounded_and_can_be_forgotten(self):
-        kept = 0
-        while save(f"state_{kept}").success:
-            kept += 1
-        self.assertLessEqual(kept, MOST)
-        self.assertFalse(save("one more").success)
-        data = gazebo("save_state", read="state_0").data
-        before = step(1).sim_time
-        answer = gazebo("restore_state", data=data, name="one more")
-        self.assertFalse(answer.success)
-        self.assertAlmostEqual(step(1).sim_time, before + 0.001, places=9)  # nothing has changed
-        self.assertTrue(save("state_0").success)  # a new one in the place of the old one
-        names = [f"state_{number}" for number in range(kept)]
+        names = [f"state_{number}" for number in range(MOST)]
+        for name in (*names, "state_0"):  # a new one in the place of the old one
+            self.assertTrue(save(name).success)
+        data = gazebo("save_state", read="state_1").data
+        self.assertTrue(gazebo("restore_state", data=data, name="one more").success)
+        self.assertIn("discarded as the oldest of 1000", restore("state_1").status_message)
+        self.assertTrue(restore("state_0").success)
         self.assertTrue(save("one more", forget=[*names, "never saved"]).success)
-        self.assertFalse(restore("state_1").success)
+        self.assertFalse(restore("state_2").success)
         self.assertTrue(restore("one more").success)
+
+    def test_long_names_are_refused_and_cut(self):
+        for answer in (save("x" * 201), restore("x" * 201)):
+            self.assertIn("a state's name has at most 200 characters, not 201", answer.status_message)

@@ -112,7 +112,7 @@ def test_a_users_controller_is_saved_by_its_attributes(sim):
     future(sim, 10)
     check_branches(sim, lambda: future(sim, 20))
     mine.callback = lambda: 0
-    with sim.lock, pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and a load_"):
+    with sim.lock, pytest.raises(StateError, match=r"^Counting.callback: .*state_dict\(\) and load_"):
         sim.save_state()
 
 
