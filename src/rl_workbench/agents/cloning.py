@@ -14,13 +14,14 @@ from rl_workbench.agents.policy_networks import Bounds
 from rl_workbench.agents.settings import CloningSettings
 from rl_workbench.states import generator_state, load_optimizer, set_generator
 
-CHANNELS, FEATURES = (16, 32, 32), 64  # of the convolutions, and what they make of an image
+CHANNELS = 32  # of features of an image
+SHARPNESS = 100.0  # of the softmax; at 1 it is nearly even over an image, and learns slowly
 
 
 class CloneNetwork(nn.Module):
     """Maps observations (N, D), all parts side by side, to outputs (N, A).
 
-    `shapes` are those of the parts: images (height, width, channels) go through convolutions.
+    `shapes` are those of the parts: of images (height, width, channels) it sees where their features are.
     """
 
     def __init__(self, shapes: Sequence[tuple[int, ...]], outputs: int, hidden: Sequence[int]) -> None:
@@ -28,8 +29,8 @@ class CloneNetwork(nn.Module):
         self.shapes, self.sizes = list(shapes), [math.prod(shape) for shape in shapes]
         numbers = sum(size for size, shape in zip(self.sizes, shapes, strict=True) if len(shape) < 3)
         self.scaling = Scaling(np.zeros(numbers, np.float32), np.ones(numbers, np.float32), CLIP)
-        self.images = nn.ModuleList(_convolutions(shape) for shape in shapes if len(shape) == 3)
-        widths = [numbers + FEATURES * len(self.images), *hidden]
+        self.images = nn.ModuleList(Places(shape[2]) for shape in shapes if len(shape) == 3)
+        widths = [numbers + 3 * CHANNELS * len(self.images), *hidden]
         layers: list[nn.Module] = []
         for before, after in zip(widths, widths[1:], strict=False):
             layers += [nn.Linear(before, after), nn.ReLU()]
@@ -43,20 +44,33 @@ class CloneNetwork(nn.Module):
         for shape, part in zip(self.shapes, parts, strict=True):
             if len(shape) == 3:
                 pictures = part.reshape(-1, *shape).permute(0, 3, 1, 2)
-                seen.append(next(convolutions)(pictures / 255.0))
+                seen.append(next(convolutions)(pictures / 127.5 - 1.0))
             else:
                 numbers.append(part)
         plain = [self.scaling(torch.cat(numbers, 1))] if numbers else []
         return self.head(torch.cat([*plain, *seen], 1))
 
 
-def _convolutions(shape: tuple[int, ...]) -> nn.Module:
-    layers: list[nn.Module] = []
-    for before, after in zip((shape[2], *CHANNELS), CHANNELS, strict=False):
-        layers += [nn.Conv2d(before, after, 3, stride=2, padding=1), nn.ReLU()]
-    height, width = (math.ceil(side / 2 ** len(CHANNELS)) for side in shape[:2])
-    size = CHANNELS[-1] * height * width
-    return nn.Sequential(*layers, nn.Flatten(), nn.Linear(size, FEATURES), nn.ReLU())
+class Places(nn.Module):
+    """Maps images (N, colours, H, W), from -1 to 1, to where features are in them, and how strong: (N, 96).
+
+    A spatial softmax: a place is the mean over a softmax of its feature, from -1 to 1 along each side.
+    """
+
+    def __init__(self, colours: int) -> None:
+        super().__init__()
+        self.features = nn.Sequential(
+            nn.Conv2d(colours, CHANNELS // 2, 5, stride=2, padding=2), nn.ReLU(),
+            nn.Conv2d(CHANNELS // 2, CHANNELS, 3, stride=2, padding=1), nn.ReLU(),
+            nn.Conv2d(CHANNELS, CHANNELS, 1),
+        )  # fmt: skip
+
+    def forward(self, images: torch.Tensor) -> torch.Tensor:
+        seen = self.features(images)
+        shares = torch.softmax(SHARPNESS * seen.flatten(2), 2).reshape(seen.shape)
+        down, across = (torch.linspace(-1.0, 1.0, side, device=seen.device) for side in seen.shape[2:])
+        strengths = (shares * seen).sum((2, 3))
+        return torch.cat([shares.sum(2) @ across, shares.sum(3) @ down, strengths], 1)
 
 
 class CloningAgent:

@@ -26,6 +26,7 @@ SPREAD = (0.07, 0.12)  # [m] of cubes and goals around it, along x and y, either
 TURNED = 0.25  # [rad] of a cube from facing the arm, either way
 STEP, CLOSING = 0.025, 0.01  # [m] that an action moves the tip along an axis, and a finger, at most
 UNIT = 0.1  # [m]: numbers of order 1, which networks tell apart
+OWN = [0, 1, 2, 9, 10]  # numbers that tell of the arm alone
 NEAR = 0.02  # [m] of the way to the cube, which is seen better from there on
 LIFTED = 0.10  # [m]: the cube is up
 CLOSE = 0.05  # [m]: it is at its goal
@@ -229,6 +230,15 @@ def pick(observation: Any, env: Any = None) -> np.ndarray:
         move = way + (0.0, 0.0, above)
     closing = 1.0 if is_near else -1.0
     return np.clip([*(move / STEP), closing], -1.0, 1.0).astype(np.float32)
+
+
+def by_camera(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """Wraps `PickCube` for policies that see the cube in a picture alone; the environment has its camera.
+
+    Observed are "state" (5,), numbers 0 to 2, 9 and 10 of the task's, which tell of the arm, and "pixels".
+    """
+    own = gymnasium.wrappers.TransformObservation(env, lambda seen: seen[OWN], numbers(len(OWN)))
+    return gymnasium.wrappers.AddRenderObservation(own, render_only=False)
 
 
 def draw_cube(rng: np.random.Generator) -> np.ndarray:

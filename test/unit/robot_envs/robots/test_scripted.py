@@ -171,6 +171,17 @@ class TestGripperArm:
         assert 0 < held < 10
         env.close()
 
+    def test_by_camera_the_cube_is_in_the_picture_alone(self) -> None:
+        made = gymnasium.make("robot_envs/PickCube-v0", render_mode="rgb_array", width=36, height=36)
+        env, seen = gripper_arm.by_camera(made), []
+        for y in (-0.1, 0.1):
+            start = gripper_arm.placed(gripper_arm.MIDDLE, np.array([0.36, y, 0.02]), 0.0)
+            seen.append(env.reset(seed=0, options={"initial_state": start})[0])
+        first, other = seen
+        assert env.observation_space.contains(first) and np.array_equal(first["state"], other["state"])
+        assert not np.array_equal(first["pixels"], other["pixels"])
+        env.close()
+
 
 class TestFuruta:
     BALANCE = np.array([-0.27, 4.39, -0.25, 0.49])  # LQR at the top
