@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import torch
 from torch import nn
 
 from rl_workbench.errors import WorkbenchError
@@ -43,6 +44,7 @@ def environment_of(run: Run, options: Mapping[str, Any]) -> Env:
 
 def load_any(run: Run, which: str, env_options: Mapping[str, Any], seed: int) -> Player:
     """Loads the policy of a checkpoint, see `load_learned`, or makes a random policy with that seed."""
+    torch.set_num_threads(1)  # as in a training: more are slower, the more so beside other jobs
     if which != RANDOM:
         return load_learned(run, which, env_options)
     env = environment_of(run, env_options)
