@@ -113,7 +113,10 @@ class SavedEnv(DrawnEnv):
         self._check_beginning(state)
 
     def _check_beginning(self, state: dict[str, Any]) -> None:
-        if not is_within(vars(state["variation"]), STRONGEST):
+        varied = vars(state["variation"])
+        if missing := [name for name, each in varied.items() if each is None and name != "gravity"]:
+            raise SnapshotError(f"the variation lacks {missing[0]}")
+        if not is_within(varied, STRONGEST):
             raise SnapshotError("a number of the variation is too large, or NaN")
         self.scene.commands(state["first"])
 
