@@ -40,7 +40,8 @@ def close_loop(
 
     `links` are PyBullet's, and `offsets` their frames in the file, seen from PyBullet's, where they differ.
     """
-    joint = offsets.get(helper.name, Pose()).inverse()  # in the frames that both links have in the file
+    # In the frames that both links have in the file.
+    joint = offsets.get(helper.name, Pose()).inverse()
     places, frames = [], []
     for name in (helper.part_of, helper.name):
         places.append((body, links[name]))

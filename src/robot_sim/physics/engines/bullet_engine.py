@@ -169,7 +169,8 @@ class BulletEngine(Engine):
         self._step()
 
     def contacts(self) -> list[Contact]:
-        points = pybullet.getContactPoints(physicsClientId=self._client)  # without those that were only near
+        # Without those that were only near.
+        points = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in points if each[9] > 0.0]
 
     def fastened(self) -> dict[int, Any]:

@@ -37,7 +37,8 @@ HEADER, FACET = 84, 50  # [bytes]
 NAME = re.compile(r"(?:^[ \t]*|\bend)solid(?:(?!facet)[^\r\n])*", re.IGNORECASE | re.MULTILINE)
 VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
-FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")  # COLLADA
+# COLLADA
+FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 OF_NODES = ("node", "instance_node", "instance_geometry",
             "matrix", "translate", "rotate", "scale", "lookat", "skew")  # fmt: skip
 OF_SCENES = ("library_geometries", "library_nodes", "library_visual_scenes", "scene")
