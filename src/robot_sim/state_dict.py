@@ -15,7 +15,6 @@ that its class, or one that it is derived from, names as `non_persistent` are le
 import contextlib
 import copy
 import dataclasses
-import random
 from collections import defaultdict, deque
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from contextvars import ContextVar
@@ -25,12 +24,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-GENERATOR = "__generator__"  # the key of a generator's kind in its state
+from robot_sim.generators import KIND, is_generator, put_generator, saved_generator
+
 NUMBERS_AND_TEXTS = "biufcSU"  # kinds of arrays
-GENERATORS = (np.random.Generator, random.Random)
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
-LARGEST_POOL = 1024  # of a seed sequence; NumPy's has 4
-BIT_GENERATORS = ("PCG64", "PCG64DXSM", "Philox", "SFC64", "MT19937")
 
 
 # Objects that loads within `undoable` have changed, with the attributes that they had.
@@ -79,7 +76,7 @@ def state_of(part: Any) -> Any:
     """
     kind = type(part)
     method = getattr(kind, "state_dict", None)
-    if isinstance(part, GENERATORS):
+    if is_generator(part):
         return _saved_as(part, kind, "state")
     if method is None or not hasattr(kind, "load_state_dict"):
         return {} if isinstance(part, Shared) else attributes_of(part)
@@ -109,8 +106,8 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
                 put_attributes(part, state, taken)
             elif takes is not None:
                 part.load_state_dict(_saved(state))  # a copy: it may keep what it gets
-            elif isinstance(part, GENERATORS):
-                _put_generator(part, state, taken)
+            elif is_generator(part):
+                _loaded_generator(part, state, taken)
             elif not isinstance(part, Shared):
                 put_attributes(part, state, taken)
         except StateError as error:
@@ -251,8 +248,11 @@ def _saved(value: Any) -> Any:
         return value
     if isinstance(value, Shared):
         return Held(kind.__qualname__, None)
-    if isinstance(value, GENERATORS) or _is_torchs(value):
-        return _of_generator(value)
+    if is_generator(value):
+        try:
+            return saved_generator(value)
+        except ValueError as error:
+            raise _Unknown(str(error)) from None
     if hasattr(kind, "state_dict") and hasattr(kind, "load_state_dict"):
         return Held(kind.__qualname__, state_of(value))
     if isinstance(value, tuple) and hasattr(kind, "_fields"):
@@ -294,31 +294,6 @@ def plain_key(key: Any) -> Any:
     return key
 
 
-def _is_torchs(value: Any) -> bool:
-    kind = type(value)
-    return kind.__name__ == "Generator" and kind.__module__.partition(".")[0] == "torch"
-
-
-def _of_generator(value: Any) -> dict[str, Any]:
-    if isinstance(value, random.Random) and not isinstance(value, random.SystemRandom):
-        return {GENERATOR: "Random", "state": value.getstate()}
-    if _is_torchs(value):
-        return {GENERATOR: "torch", "state": value.get_state().numpy().copy()}
-    bits = getattr(value, "bit_generator", value)
-    kind = type(bits).__name__
-    if kind not in BIT_GENERATORS:
-        raise _Unknown(f"a generator of type {kind}")
-    return {GENERATOR: kind, "state": _saved(bits.state), "seeds": _seeds(bits)}
-
-
-def _seeds(bits: Any) -> list[Any] | None:
-    """Returns what a generator spawns others from."""
-    seeds = bits.seed_seq
-    if type(seeds) is not np.random.SeedSequence:
-        return None
-    return [seeds.entropy, seeds.spawn_key, seeds.pool_size, seeds.n_children_spawned]
-
-
 def _nothing(part: Any, state: Any) -> None:
     """Loads nothing: the owner of shared state loads it."""
 
@@ -349,8 +324,8 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
         there = current if isinstance(current, (list, tuple)) else ()
         return kind([_loaded(each, own, taken) for own, each in zip_longest(saved, there[: len(saved)])])
     if kind is dict:
-        if GENERATOR in saved:
-            return _put_generator(current, saved, taken)
+        if KIND in saved:
+            return _loaded_generator(current, saved, taken)
         known = current if type(current) in (dict, defaultdict) else {}
         entries = {key: _loaded(known.get(key), each, taken) for key, each in saved.items()}
         if type(current) is defaultdict:
@@ -362,6 +337,16 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
         there = [*current] if isinstance(current, deque) else ()
         return deque(_loaded(there, [*saved], taken), saved.maxlen)
     return _saved(saved)
+
+
+def _loaded_generator(current: Any, saved: Mapping[str, Any], taken: Taken | None) -> Any:
+    """Returns a generator with a saved state: a new one if the current one has taken another state."""
+    if is_generator(current) and _has_taken(current, saved, taken):
+        current = None
+    try:
+        return put_generator(current, saved)
+    except ValueError as error:
+        raise StateError(str(error)) from None
 
 
 def _has_taken(part: Any, state: Any, taken: Taken | None) -> bool:
@@ -379,54 +364,3 @@ def _alike(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return one.shape == other.shape and one.tobytes() == other.tobytes()
     return repr(one) == repr(other)  # so is NaN
-
-
-def _put_generator(current: Any, saved: Mapping[str, Any], taken: Taken | None) -> Any:
-    """Loads a generator's state into the current one, or into a new one.
-
-    It is a new one if their kinds differ, or if the current one has taken another state.
-    """
-    kind, state = saved[GENERATOR], saved["state"]
-    if (isinstance(current, GENERATORS) or _is_torchs(current)) and _has_taken(current, saved, taken):
-        current = None
-    if kind not in ("torch", "Random", *BIT_GENERATORS):
-        raise StateError(f"there is no generator of type {kind!r:.100}")
-    target: Any
-    if kind == "torch":
-        if not _is_torchs(current):
-            raise StateError("there is no torch.Generator for the state of one")
-        numbers = current.get_state()
-        numbers.numpy()[:] = state
-        current.set_state(numbers)
-        return current
-    if kind == "Random":
-        target = current if isinstance(current, random.Random) else random.Random()
-        target.setstate(state)
-        return target
-    is_same = isinstance(current, np.random.Generator) and (type(current.bit_generator).__name__ == kind)
-    target = current if is_same else np.random.Generator(getattr(np.random, kind)())
-    bits: Any = target.bit_generator
-    seeds = saved["seeds"]
-    if seeds is None or seeds == _seeds(bits):
-        bits.state = checked_bits(state)
-        return target
-    entropy, spawn_key, pool_size, spawned = seeds
-    if pool_size > LARGEST_POOL or len(spawn_key) > LARGEST_POOL:
-        raise StateError(f"there is no seed sequence with a pool of {pool_size} and {len(spawn_key)} parents")
-    again = np.random.SeedSequence(
-        entropy, spawn_key=spawn_key, pool_size=pool_size, n_children_spawned=spawned
-    )
-    bits.__setstate__((checked_bits(state), again))
-    return target
-
-
-def checked_bits(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Checks a bit generator's position in its buffers, which NumPy doesn't; returns the state.
-
-    Raises:
-        StateError: If a position lies outside of its buffer.
-    """
-    places = (state["state"].get("pos", 0), 624), (state.get("buffer_pos", 0), 4)
-    if all(0 <= place <= count for place, count in places):
-        return state
-    raise StateError("the generator's position lies outside of its numbers")

@@ -19,9 +19,10 @@ from bullet_gazebo.common.node_process import seed_random_numbers
 from bullet_gazebo.services import ServiceRefused, offer
 from bullet_gazebo.services.step_service import StepService
 from file_access.text import did_you_mean
+from robot_sim.generators import checked_bits
 from robot_sim.simulator import Simulator
 from robot_sim.snapshot import Snapshot, SnapshotError
-from robot_sim.state_dict import StateError, checked_bits
+from robot_sim.state_dict import StateError
 
 MOST = 1000  # states; then the oldest one goes, since clients may end without forgetting theirs
 LONGEST = 200  # characters of a name
