@@ -90,9 +90,12 @@ class JointHandle(Shared, Stateful):
         For an angle it is the shortest turn, within the limits of a revolute joint
         (docs/contract/ros_control.md 3.2).
         """
+        way = position - self.position
         if self.kind == "prismatic":
-            return position - self.position
+            return way
         limits = self.limits
         if self.kind == "revolute" and limits.lower is not None and limits.upper is not None:
+            if -math.pi < way <= math.pi and limits.lower <= position <= limits.upper:  # nearly always true
+                return way
             return shortest_distance_within(self.position, position, limits.lower, limits.upper)
-        return shortest_distance(self.position, position)
+        return normalized(way)
