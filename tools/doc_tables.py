@@ -34,7 +34,7 @@ def with_tables(name: str, page: str) -> str:
 
 
 def elements() -> str:
-    """Returns the tables of elements."""
+    """Returns the lists of elements."""
     return "\n".join(_section(each) for each in element_table().values())
 
 
@@ -69,14 +69,10 @@ def _section(section: Section) -> str:
     if read:
         lines += [f"Read: {', '.join(_listed(read))}.", ""]
     others = [(path, row) for path, row in named if row.answer != READ]
-    if others:
-        lines += ["| without effect | warning | why |", "|---|---|---|"]
-        for (answer, why), group in groupby(others, key=lambda each: (each[1].answer, each[1].why)):
-            rows = list(group)
-            names = ", ".join(_listed(rows))
-            warning = " / ".join(dict.fromkeys(_warning(row) for _, row in rows))
-            lines.append(f"| {names} | {warning if answer == WARNED else ''} | {why} |")
-        lines.append("")
+    for _, group in groupby(others, key=lambda each: (each[1].answer, each[1].why, not each[1].default)):
+        rows = list(group)
+        lines.append(f"- {', '.join(_listed(rows))}{_warning(rows)}: {rows[0][1].why}")
+    lines += [""] if others else []
     return "\n".join(lines)
 
 
@@ -102,14 +98,19 @@ def _name(name: str, row: Row) -> str:
     return f"[`{name}`](#{anchor})"
 
 
-def _warning(row: Row) -> str:
-    if not row.default:
-        return "yes"
+def _warning(rows: list[tuple[str, Row]]) -> str:
+    if rows[0][1].answer != WARNED:
+        return ""
+    values = " / ".join(dict.fromkeys(_values(row.default) for _, row in rows))
+    return f" (warning unless {values})" if values else " (warning)"
+
+
+def _values(default: str) -> str:
     values = []
-    for each in row.default.split("|"):
+    for each in filter(None, default.split("|")):
         neighbour, _, value = each.partition("/")
         values.append(f"as `{neighbour[1:]}`" if value else each.replace(",", " "))
-    return f"unless {' or '.join(values)}"
+    return " or ".join(values)
 
 
 PAGES: dict[str, tuple[str, Callable[[], str]]] = {  # what each page's tables are made from, and how
