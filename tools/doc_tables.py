@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The tables of the pages that are made from declarations in the code: writes them into the pages."""
+"""The lists of the pages that are made from declarations in the code: writes them into the pages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ START, END = "<!-- Made by tools/doc_tables.py from {}. -->\n", "<!-- End of wha
 
 
 def with_tables(name: str, page: str) -> str:
-    """Returns a page of docs with its tables as they should be."""
+    """Returns a page of docs with its lists as they should be."""
     source, make = PAGES[name]
     before, start, rest = page.partition(START.format(source))
     return before + start + "\n" + make() + END + rest.partition(END)[2]
@@ -39,27 +39,32 @@ def elements() -> str:
 
 
 def parameters() -> str:
-    """Returns the tables of controllers' parameters: one for all types that share some."""
+    """Returns the lists of controllers' parameters: one for all types that share some."""
     users: dict[type[Parameters], list[str]] = {}
     for name, controller in built_in().items():
         for given in (parent for each in controller.parameters for parent in each.__mro__):
             if issubclass(given, Parameters) and given is not Parameters:
                 users.setdefault(given, []).append(name)
-    tables: dict[str, list[str]] = {}
+    lists: dict[str, list[str]] = {}
     for given, names in users.items():
-        rows = tables.setdefault(", ".join(f"`{name}`" for name in names), [])
+        rows = lists.setdefault(", ".join(f"`{name}`" for name in names), [])
         own = [each for key, each in given.declared().items() if key in given.__annotations__]
-        rows += [f"| `{each.key}` | {_default(each.default)} | {each.about} |" for each in own]
-    head = "| parameter | default | what it is |\n|---|---|---|"
-    return "\n".join(f"{names}:\n\n{head}\n" + "\n".join(rows) + "\n" for names, rows in tables.items())
+        rows += [f"- `{each.key}`{_default(each.default)}: {each.about}" for each in own]
+    return "\n".join(f"{names}:\n\n" + "\n".join(rows) + "\n" for names, rows in lists.items())
 
 
 def _default(value: object) -> str:
     if value is MISSING:
-        return "required"
+        return " (required)"
     if isinstance(value, bool):
-        return str(value).lower()
-    return f"`{value}`" if isinstance(value, str) else f"{value:g}" if isinstance(value, int | float) else ""
+        return f" ({str(value).lower()})"
+    return (
+        f" (`{value}`)"
+        if isinstance(value, str)
+        else f" ({value:g})"
+        if isinstance(value, int | float)
+        else ""
+    )
 
 
 def _section(section: Section) -> str:
@@ -113,7 +118,7 @@ def _values(default: str) -> str:
     return " or ".join(values)
 
 
-PAGES: dict[str, tuple[str, Callable[[], str]]] = {  # what each page's tables are made from, and how
+PAGES: dict[str, tuple[str, Callable[[], str]]] = {  # what each page's lists are made from, and how
     "files.md": ("elements.toml in src/robot_sim/physics/files", elements),
     "controllers.md": ("src/robot_sim/control/controllers", parameters),
 }

@@ -107,5 +107,5 @@ def test_a_wrong_parameter_is_named(wrong: dict[str, Any], fault: str) -> None:
 
 def test_the_documentation_has_its_parameters() -> None:
     found = tool().parameters()
-    assert "| `slope` | required | speed of the valve [rad/s/K] |" in found
-    assert "| `room` | 290 | temperature of the room [K] |" in found
+    assert "- `slope` (required): speed of the valve [rad/s/K]\n" in found
+    assert "- `room` (290): temperature of the room [K]\n" in found
