@@ -46,7 +46,7 @@ class StandInTest(WorldCase):
         world = gazebo("get_world_properties")
         self.assertEqual(world.model_names, ["ground_plane", "cartpole"])
         self.assertTrue(world.success)
-        self.assertFalse(world.rendering_enabled, "there are no cameras (docs/differences.md)")
+        self.assertFalse(world.rendering_enabled, "there are no cameras (docs/gazebo.md)")
         self.assertEqual(world.status_message, "GetWorldProperties: got properties")
 
     def test_joint_properties(self):
