@@ -136,7 +136,10 @@ def detach_from_world(model: ModelDescription) -> None:
         model.foot = list(model.joints).index(anchors[0].name)
         del model.joints[anchors[0].name], model.links[WORLD]
         model.root, model.root_pose = anchors[0].child, anchors[0].pose
-    elif not model.world_joints:
+        return
+    for joint in anchors:
+        joint.kept = joint.kept or joint.kind == "fixed"
+    if not model.world_joints:
         model.world_joints = [WORLD]
 
 

@@ -74,6 +74,20 @@ def test_a_massless_root_takes_the_mass_of_what_is_fixed_to_it_and_others_are_dr
     assert "ghost" in model.warnings[0]
 
 
+def test_each_link_that_is_fixed_to_world_stays_a_link_and_where_it_is(space):
+    """sdformat lumps no joint to `world`."""
+    fixed = joint("a", "fixed", "world", "base"), joint("b", "fixed", "world", "table")
+    model = read(
+        WORLD, link("base"), link("table"), link("arm"), *fixed, joint("j", "continuous", "base", "arm")
+    )
+    spawned = space.spawn("r", model, Pose())
+    assert spawned.link_names == ["base", "arm", "table"] and spawned.all_joints == ["a", "j", "b"]
+    before = spawned.link_state("base"), spawned.link_state("table")
+    spawned.body.apply_efforts((0.1,))
+    run(space, 100)
+    assert (spawned.link_state("base"), spawned.link_state("table")) == before
+
+
 def test_a_robot_may_turn_on_the_world_itself_or_float(space):
     arm = read(WORLD, link("arm"), joint("j", "continuous", "world", "arm"))
     spawned = space.spawn("r", arm, Pose())
