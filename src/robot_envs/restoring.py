@@ -12,10 +12,11 @@ from robot_envs.snapshot import EnvSnapshot
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Sensor
 from robot_envs.world_state import Joints, WorldState
+from robot_sim.generators import KIND
 from robot_sim.physics.engine import STRONGEST
 from robot_sim.plain_data import is_within, misfit, resolve
 from robot_sim.snapshot import SnapshotError
-from robot_sim.state_dict import StateError, load, module_of, state_of, undoable
+from robot_sim.state_dict import StateError, is_supplied, load, module_of, state_of, undoable
 
 
 class SavedEnv(DrawnEnv):
@@ -104,10 +105,14 @@ class SavedEnv(DrawnEnv):
             "state": WorldState(0.0, Joints()), "first": {}, "steps": 0, "parts": {}, "lent": [],
             "variation": self._variation, "initial": self._initial, **(before.state if before else {}),
         }  # fmt: skip
-        users = "task", "randomisation"
-        there["parts"] = {name: each for name, each in there["parts"].items() if name not in users}
+        there["parts"] = {name: state_of(each) for name, each in self._parts().items() if is_supplied(each)}
         if fault := misfit(there, state):
             raise SnapshotError(fault)
+        own, given = there["parts"].get("task", {}), state["parts"].get("task", {})
+        if lost := [name for name in own if name not in given]:
+            raise SnapshotError(f"the task lacks {lost[0]}")
+        if any(KIND not in given.get(name, ()) for name in state["lent"]):
+            raise SnapshotError(f"the task has no generators {state['lent']!r:.200}")
         if (state["steps"] or 0) < 0:
             raise SnapshotError(f"steps is {state['steps']}")
         self._check_beginning(state)

@@ -3,19 +3,21 @@
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import astuple, fields, is_dataclass
 from pathlib import PurePath
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from robot_sim.control.controllers.base import Controller
+from robot_sim.control.joint import JointHandle
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
 from robot_sim.physics.model import NO_STOP
 from robot_sim.physics.pose import Pose
 from robot_sim.physics.world import World
-from robot_sim.plain_data import entries_of, is_within, misfit
+from robot_sim.plain_data import LARGEST, entries_of, is_within, misfit
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import SnapshotError
-from robot_sim.state_dict import Shared, Stateful
+from robot_sim.state_dict import Shared, Stateful, is_supplied
 
 # What has no effect on motion, or is compared by itself (`Model.properties`).
 LEFT_OUT: Mapping[type, frozenset[str]] = {
@@ -43,13 +45,25 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
             {
                 "model": robot.model.name,
                 "controllers": {
-                    each.name: type(each).__name__
+                    each.name: _controller(each)
                     for each in robot.manager.running
                     if any(each.claims.values())
                 },
             }
             for robot in robots
         ],
+    }
+
+
+def _controller(controller: Controller) -> dict[str, Any]:
+    """Returns its class, joints and configured gains, which a snapshot doesn't bring back."""
+    lists = [each for each in vars(controller).values() if isinstance(each, list)]
+    handles = [getattr(each, "joint", each) for entries in lists for each in entries]
+    return {
+        "type": type(controller).__name__,
+        "claims": dict(controller.claims),
+        "joints": [each.name for each in handles if isinstance(each, JointHandle)],
+        "gains": {name: astuple(pid.configured) for name, pid in controller.pids.items()},
     }
 
 
@@ -87,7 +101,11 @@ def check_foreign(
         SnapshotError: If something is of another type, or a tick would fail.
     """
     pairs = zip(robots, before["robots"], state["robots"], strict=True)
-    faults = [misfit({**before, "robots": [_known(*each) for each in pairs]}, state)]
+    own_parts = {name: each for name, each in before["parts"].items() if is_supplied(parts[name])}
+    known = {**before, "robots": [_known(*each) for each in pairs], "parts": own_parts}
+    faults = [misfit(known, state)]
+    if not 0 <= state["now"] < LARGEST // 2:
+        faults.append(f"its time is {state['now']}")
     physics = [state["world"], state["applied"], [each["efforts"] for each in state["robots"]]]
     if not is_within(physics, NO_STOP):
         faults.append("positions, velocities, forces or efforts are too large, or NaN")
@@ -110,10 +128,17 @@ def check_foreign(
 
 
 def _known(robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a robot's state without controllers that only publish and that the other one lacks."""
+    """Returns a robot's state without users' controllers, and publishing ones that the other lacks."""
     claiming = {each.name for each in robot.manager.running if any(each.claims.values())}
     manager, there = own["manager"], given["manager"]["controllers"]
-    kept = {name: each for name, each in manager["controllers"].items() if name in claiming or name in there}
+    kept = {
+        name: each
+        for name, each in manager["controllers"].items()
+        if is_supplied(robot.manager.get(name)) and (name in claiming or name in there)
+    }
+    for name, each in kept.items():
+        if name in there and isinstance(each, dict) and set(each) != set(there[name]):
+            raise SnapshotError(f"{name} has {list(there[name])!s:.200}, not {list(each)!s:.200}")
     return {**own, "manager": {**manager, "controllers": kept}}
 
 

@@ -23,6 +23,11 @@ OF_A_DEQUE = 16  # entries that an empty one counts as; it takes 760 bytes
 MOST_COPIED, TIMES = 2**24, 8  # [bytes], and of all bytes: what extensions within others may copy
 ALIKE = 100  # keys of a dictionary with the same hash: finding one takes longer with each
 TUPLE, ARRAY, SCALAR, RECORD, DEQUE, INTEGER = range(1, 7)  # codes of MessagePack's extensions
+# Attributes that may be None for a while.
+OPTIONAL = frozenset(
+    ("_angles", "_before", "_clock", "_goal", "_kept", "_last", "_newest", "_seen", "_waited")
+    + ("gravity", "net", "steps", "value")
+)
 LARGEST = 2**63  # what counts nanoseconds stays below
 LONGEST_INTEGER = 256  # [bytes]; states of generators have 16 to 64
 
@@ -252,12 +257,11 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         place: Of both in a larger state.
         exactly: Whether names and lengths have to be the same, too.
     """
-    is_held = exactly and isinstance(there, Held)
     there, given = (each.item() if isinstance(each, np.generic) else each for each in (there, given))
     numbers = (int, float)
     if _is_odd(given) and (isinstance(there, int) or (exactly and not _is_odd(there))):
         return f"{place} is {given}"
-    if there is None or (given is None and not (is_held or _refers(there))):
+    if there is None or (given is None and place.rpartition("/")[2] in OPTIONAL):
         return ""
     if type(there) in numbers and type(given) in numbers:
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers
@@ -275,16 +279,21 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
     entries = there.items() if isinstance(there, dict) else ()
     lost = any(key not in given and _refers(each) for key, each in entries)
-    if isinstance(there, list):
-        objects = zip(there, given, strict=False)
-        lost = any(isinstance(one, Held) and other is None for one, other in objects)
-    if lost or (isinstance(there, (list, tuple)) and len(there) != len(given) and _refers(there)):
+    if isinstance(there, (list, tuple)) and len(there) != len(given):
+        are_numbers = (
+            isinstance(there, tuple) and there != () and all(type(each) in numbers for each in there)
+        )
+        lost = are_numbers or _refers(there) or (not given and any(isinstance(each, Held) for each in there))
+    if lost:
         return f"{place} lacks joints, or other parts that are here"
     pairs: Iterable[tuple[Any, Any, Any]] = ()
     if isinstance(there, dict):
         pairs = ((key, there[key], given[key]) for key in there if key in given)
     elif isinstance(there, (list, tuple)) and len(there) == len(given):
         pairs = zip(range(len(there)), there, given, strict=True)
+    elif isinstance(there, deque) and there:  # of the same kind of entries, few or many
+        like = there if len(there) == len(given) else [there[0]] * len(given)
+        exactly, pairs = True, zip(range(len(given)), like, given, strict=True)
     elif hasattr(there, "__dataclass_fields__"):
         names = fields_of(type(there))
         pairs = ((name, getattr(there, name), getattr(given, name)) for name in names)

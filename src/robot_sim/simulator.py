@@ -1,5 +1,6 @@
 """The clockwork: physics and control, tick by tick (docs/architecture.md, "One tick")."""
 
+import contextlib
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -305,7 +306,8 @@ class Simulator(Shared):
             with undoable():
                 self._load(state)
         except BaseException as error:  # whatever a forged state raises, and Ctrl-C
-            self._load(before)
+            with contextlib.suppress(StateError):  # of a user's class
+                self._load(before)
             if not isinstance(error, Exception):
                 raise
             raise SnapshotError(one_line(f"the snapshot can't be restored: {error!s:.300}")) from error

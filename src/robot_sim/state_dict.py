@@ -280,6 +280,11 @@ def module_of(kind: type) -> str:
     return "__main__" if kind.__module__ == "__mp_main__" else kind.__module__
 
 
+def is_supplied(part: Any) -> bool:
+    """Returns whether an object's class comes along, and isn't a user's, which may hold anything."""
+    return type(part).__module__.partition(".")[0] in ("bullet_gazebo", "cartpole", "robot_envs", "robot_sim")
+
+
 def fields_of(kind: Any) -> tuple[str, ...]:
     """Returns the names of a data class's fields."""
     return tuple([each.name for each in dataclasses.fields(kind)])

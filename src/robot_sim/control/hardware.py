@@ -27,6 +27,7 @@ IMU = "ImuSensorInterface"
 FORCE_TORQUE = "ForceTorqueSensorInterface"
 FULL = 0.999  # of an effort limit
 PUSHED, BACK = 1e-3, 1e-4  # [rad, m] off a motor's command: pushed away, and back at it
+FURTHEST = 1e9  # [rad, m]; no command is as far
 GAINS = "gazebo_ros_control/pid_gains"  # where, in the robot's namespace, gains of drives stand
 
 
@@ -104,7 +105,7 @@ class PositionDrive(Drive):
 
     def joints_moved(self) -> None:
         """Forgets where the joint was, after a service or reset has moved it."""
-        self._aim, self._way = self.joint.position, math.inf
+        self._aim, self._way = self.joint.position, FURTHEST
         self.blocked = self.pushed = False
 
     def relatch(self) -> None:

@@ -80,12 +80,12 @@ class Pid(Stateful):
     `listeners`, which returns the number of subscribers: without any there is no report.
     """
 
-    __slots__ = ("d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",
+    __slots__ = ("configured", "d_error", "gains", "i_error", "last_error", "listeners", "output", "p_error",
                  "publish_state", "seeded", "sink")  # fmt: skip
-    non_persistent = ("listeners", "publish_state", "sink")
+    non_persistent = ("configured", "listeners", "publish_state", "sink")
 
     def __init__(self, gains: Gains, publish_state: bool = False) -> None:
-        self.gains = gains
+        self.gains = self.configured = gains
         self.publish_state = publish_state
         self.sink: Callable[[PidSample], None] | None = None
         self.listeners: Callable[[], int] = one_listener

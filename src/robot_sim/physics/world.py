@@ -219,18 +219,22 @@ class World(Shared):
             return
         if not model.body.set_inertia(link, old, inertia):
             try:
-                fresh = self.engine.load(model.description, model.root_state()[0])
+                self._reload(model)
             except DescriptionError:
                 record.inertia = old
                 raise
-            stale = model.body
-            for each in self._of(model):
-                self.engine.unfasten(each.number)
-            model.move_into(fresh)
-            self.engine.remove(stale)
-            for each in self._of(model):
-                self._fasten(each)
         model.apply_damping(self.time_step)
+
+    def _reload(self, model: Model) -> None:
+        """Loads a model anew, as the last one in the engine's order."""
+        fresh = self.engine.load(model.description, model.root_state()[0])
+        stale = model.body
+        for each in self._of(model):
+            self.engine.unfasten(each.number)
+        model.move_into(fresh)
+        self.engine.remove(stale)
+        for each in self._of(model):
+            self._fasten(each)
 
     def step(self) -> None:
         """Integrates all models by one time step."""
@@ -306,9 +310,9 @@ class World(Shared):
         now = self.gravity, self.time_step, vars(self.solver)
         if now != (state["gravity"], state["time_step"], state["solver"]):
             raise SnapshotError("gravity, time step or solver have changed since the snapshot")
-        if self._order() != state["order"]:
+        if sorted(self._order()) != sorted(map(str, state["order"])):
             raise SnapshotError(
-                "links have been changed since the snapshot, and the engine takes the models in another order"
+                f"it has the models {state['order']!r:.300}, and here are {self._order()!r:.300}"
             )
         attached = {name for each in state["attachments"] for name, _ in each[:2]}
         touched = {side[0] for each in state["contacts"] for side in each[5:]}
@@ -331,6 +335,12 @@ class World(Shared):
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Loads what `state_dict` returned, after `check_state`."""
         models = self.models
+        pairs = list(zip(self._order(), state["order"], strict=True))
+        while pairs and pairs[0][0] == pairs[0][1]:
+            del pairs[0]
+        for _, name in pairs:  # links were changed, and their models loaded anew
+            self._reload(models[name])
+            models[name].apply_damping(self.time_step)
         known = {(a.first, a.second, a.pose, a.number): a for a in self.attachments}
         self.engine.refasten(state["fastened"])
         made_of = [

@@ -5,12 +5,15 @@ import dataclasses
 import hashlib
 import os
 import random
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+import yaml
 from support.scenes import play as script
 from support.scenes.play import play
 
@@ -40,6 +43,27 @@ def begun(identifier, backend):
     for _ in range(5):
         env.step(env.action_space.sample())
     return env
+
+
+IDS = [each for each in gymnasium.registry if each.startswith(("cartpole/", "robot_envs/"))]
+
+
+@pytest.mark.parametrize("options", [{}, {"sensor_noise": 0.001, "sensor_delay": 2, "action_delay": 1}])
+@pytest.mark.parametrize("identifier", IDS)
+def test_files_of_any_moment_fit_at_any_other(identifier, options):
+    env = gymnasium.make(identifier, **options).unwrapped
+    env.action_space.seed(2)
+    action, files, after = env.action_space.sample(), [], []
+    for episode in range(2):
+        env.reset(seed=episode)
+        for _ in range(2):
+            files.append(EnvSnapshot.from_bytes(env.save_state().to_bytes()))
+            after.append(repr(env.step(action)))
+    for _ in range(2):
+        for file, first in zip(files, after, strict=True):
+            env.restore_state(file)
+            assert repr(env.step(action)) == first
+    env.close()
 
 
 @pytest.mark.extras("mujoco")
@@ -93,6 +117,35 @@ def test_varied_robots_are_varied_as_they_were():
     env.reset(seed=9)
     env.restore_state(snapshot)
     assert play(env) == first
+    env.close()
+
+
+def test_a_link_that_was_varied_leaves_no_trace_in_later_episodes():
+    """PyBullet loads a model with another centre of mass anew, as its last one."""
+    env = begun("robot_envs/PickCube-v0", "bullet")
+    own, first = env.save_state(), play(env)
+    varied = gymnasium.make("robot_envs/PickCube-v0", randomisation={"com": 0.02}).unwrapped
+    varied.reset(seed=1)
+    env.reset(seed=5, options={"snapshot": varied.save_state()})
+    env.reset(seed=1)
+    for snapshot in (own, EnvSnapshot.from_bytes(own.to_bytes())):
+        env.restore_state(snapshot)
+        assert play(env) == first
+    for each in (env, varied):
+        each.close()
+
+
+def test_controllers_of_other_joints_or_gains_dont_fit():
+    env = begun("robot_envs/TwoLinkReach-v0", "bullet")
+    snapshot, robot = env.save_state(), env.backend.scene.robots[0]
+    text = Path(robot.controllers()).read_text(encoding="utf-8")
+    swapped = text.replace("joint: shoulder", "joint: x").replace("joint: elbow", "joint: shoulder")
+    for changed in (swapped.replace("joint: x", "joint: elbow"), re.sub(r"\bp: [0-9.]+", "p: 0.5", text)):
+        assert changed != text
+        other = RobotEnv(dataclasses.replace(robot, controllers=yaml.safe_load(changed)), type(env.task)())
+        with pytest.raises(SimulatorError, match="controllers that run"):
+            other.restore_state(snapshot)
+        other.close()
     env.close()
 
 
@@ -198,7 +251,10 @@ FORGED = [
     ("environment first", {"none": 1.0}),
     (f"{HARDWARE} joints wrist command", None), (f"{HARDWARE} drives wrist _most", None),
     (f"{GRIPPER} pids left_finger/pid", None), (f"{GRIPPER} _loops 0", None),
-    (f"{JOINTS} _joints", None), (f"{JOINTS} _joints", []),
+    (f"{JOINTS} _joints", None), (f"{JOINTS} _joints", []), (f"{GRIPPER} _loops", []),
+    (f"{CUBE} motion", BulletMotion(Pose(None), STILL, [])), (f"{CUBE} motion", None),
+    ("resets", None), ("now", None), ("now", 2**62), ("now", -1), (f"{GRIPPER} pids", {}),
+    ("environment parts task", {}), ("environment lent", ["cube"]),
 ]  # fmt: skip
 
 
@@ -230,8 +286,13 @@ def test_forged_ones_harm_neither_the_episode_nor_those_after_it():
         each.close()
 
 
+class Marked(SwingUpTask):
+    """A user's task."""
+
+
 def test_a_tasks_attributes_may_be_of_another_type_in_a_file():
-    env = begun("cartpole/Balance-v0", "bullet")
+    env = RobotEnv(ROBOT, Marked())
+    env.reset(seed=1)
     for there, later in [(0, 2**70), (0, NAN), ([], np.zeros(3)), (False, 3), (0, "done"), (0.0, {})]:
         env.task.mark = later
         snapshot = EnvSnapshot.from_bytes(env.save_state().to_bytes())

@@ -20,7 +20,9 @@ def built_in() -> dict[str, type[Controller]]:
     """Returns the controllers of this folder's modules, by type name."""
     modules = [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
     return {
-        name: type(made.__name__, (made,), {"type_name": name, "interface": interface})
+        name: type(
+            made.__name__, (made,), {"type_name": name, "interface": interface, "__module__": made.__module__}
+        )
         for module in modules
         for name, (made, interface) in getattr(module, "CONTROLLERS", {}).items()
     }
