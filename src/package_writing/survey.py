@@ -214,4 +214,5 @@ def height_note(height: float, stands: float | None) -> str:
     spawned = f"spawned at a height of {height:g} m"
     if height < stands:
         return f"note: {spawned} its lowest collision lies below the ground; --height {stands:g} is enough"
-    return f"{spawned}; its lowest collision touches the ground at {stands:g} m"
+    place = "there" if height == stands else f"at {stands:g} m"
+    return f"{spawned}; its lowest collision touches the ground {place}"

@@ -216,9 +216,8 @@ def replay(path: Path, episode: Demonstration, env: Env, exactly: bool = True) -
     def compare(step: int, **pairs: tuple[Any, Any]) -> None:
         for name, (now, before) in pairs.items():
             if now != before:
-                others = other_versions(episode.versions)
-                why = f" ({others})" if others else ""
-                raise WorkbenchError(f"{path} goes another way in step {step}: other {name}{why}")
+                why = other_versions(episode.versions) or "were the robot's or the task's files changed?"
+                raise WorkbenchError(f"{path} goes another way in step {step}: other {name} ({why})")
 
     if episode.actions.shape[1:] != env.action_space.shape:
         raise WorkbenchError(f"{path} has no actions of {env.action_space}: {episode.env_id} has changed")
