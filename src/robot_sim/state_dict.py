@@ -15,11 +15,13 @@ that its class, or one that it is derived from, names as `non_persistent` are le
 import contextlib
 import copy
 import dataclasses
+import sys
 from collections import defaultdict, deque
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from functools import cache
 from itertools import zip_longest
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -27,6 +29,7 @@ import numpy as np
 from robot_sim.generators import KIND, is_generator, put_generator, saved_generator
 
 NUMBERS_AND_TEXTS = "biufcSU"  # kinds of arrays
+SOURCES = f"{Path(__file__).parents[1]}/"  # of this library and those on top of it
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
 
 
@@ -282,7 +285,8 @@ def module_of(kind: type) -> str:
 
 def is_supplied(part: Any) -> bool:
     """Returns whether an object's class comes along, and isn't a user's, which may hold anything."""
-    return type(part).__module__.partition(".")[0] in ("bullet_gazebo", "cartpole", "robot_envs", "robot_sim")
+    module = sys.modules.get(type(part).__module__)
+    return (getattr(module, "__file__", None) or "").startswith(SOURCES)
 
 
 def fields_of(kind: Any) -> tuple[str, ...]:

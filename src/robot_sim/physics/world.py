@@ -119,6 +119,7 @@ class World(Shared):
         model = self.models.pop(name)
         for each in self._of(model):
             self.detach(each)
+        self._recalled = None  # it may be among them
         self.engine.remove(model.body)
         self._names = EntityNames()
         self._index(*self.models.values())
@@ -228,7 +229,7 @@ class World(Shared):
     def _reload(self, model: Model) -> None:
         """Loads a model anew, as the last one in the engine's order."""
         fresh = self.engine.load(model.description, model.root_state()[0])
-        stale = model.body
+        stale, self._recalled = model.body, None
         for each in self._of(model):
             self.engine.unfasten(each.number)
         model.move_into(fresh)
