@@ -105,7 +105,8 @@ class SavedEnv(DrawnEnv):
             "state": WorldState(0.0, Joints()), "first": {}, "steps": 0, "parts": {}, "lent": [],
             "variation": self._variation, "initial": self._initial, **(before.state if before else {}),
         }  # fmt: skip
-        there["parts"] = {name: state_of(each) for name, each in self._parts().items() if is_supplied(each)}
+        parts = self._parts().items()
+        there["parts"] = {name: state_of(each) for name, each in parts if is_supplied(type(each))}
         if fault := misfit(there, state):
             raise SnapshotError(fault)
         own, given = there["parts"].get("task", {}), state["parts"].get("task", {})

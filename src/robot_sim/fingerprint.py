@@ -57,8 +57,10 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
 
 def _controller(controller: Controller) -> dict[str, Any]:
     """Returns its class, joints and configured gains, which a snapshot doesn't bring back."""
+    # A user's may change its lists; what they refer to is compared when they are loaded.
     lists = [each for each in vars(controller).values() if isinstance(each, list)]
-    handles = [getattr(each, "joint", each) for entries in lists for each in entries]
+    entries = [each for some in lists for each in some] if is_supplied(type(controller)) else []
+    handles = [getattr(each, "joint", each) for each in entries]
     return {
         "type": type(controller).__name__,
         "claims": dict(controller.claims),
@@ -101,13 +103,11 @@ def check_foreign(
         SnapshotError: If something is of another type, or a tick would fail.
     """
     pairs = zip(robots, before["robots"], state["robots"], strict=True)
-    own_parts = {name: each for name, each in before["parts"].items() if is_supplied(parts[name])}
+    own_parts = {name: each for name, each in before["parts"].items() if is_supplied(type(parts[name]))}
     known = {**before, "robots": [_known(*each) for each in pairs], "parts": own_parts}
     if fault := misfit(known, state):
         raise SnapshotError(fault)
-    faults = []
-    if not 0 <= state["now"] < LARGEST // 2:
-        faults.append(f"its time is {state['now']}")
+    faults = [] if 0 <= state["now"] < LARGEST // 2 else [f"its time is {state['now']}"]
     physics = [state["world"], state["applied"], [each["efforts"] for each in state["robots"]]]
     if not is_within(physics, NO_STOP):
         faults.append("positions, velocities, forces or efforts are too large, or NaN")
@@ -136,7 +136,7 @@ def _known(robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, A
     kept = {
         name: each
         for name, each in manager["controllers"].items()
-        if is_supplied(robot.manager.get(name)) and (name in claiming or name in there)
+        if is_supplied(type(robot.manager.get(name))) and (name in claiming or name in there)
     }
     for name, each in kept.items():
         if name in there and isinstance(each, dict) and set(each) != set(there[name]):

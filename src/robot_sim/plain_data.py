@@ -280,9 +280,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     entries = there.items() if isinstance(there, dict) else ()
     lost = any(key not in given and _refers(each) for key, each in entries)
     if isinstance(there, (list, tuple)) and len(there) != len(given):
-        are_numbers = (
-            isinstance(there, tuple) and there != () and all(type(each) in numbers for each in there)
-        )
+        are_numbers = isinstance(there, tuple) and there != () and {*map(type, there)} <= {*numbers}
         lost = are_numbers or _refers(there) or (not given and any(isinstance(each, Held) for each in there))
     if lost:
         return f"{place} lacks joints, or other parts that are here"

@@ -63,12 +63,18 @@ class Shared:
 
     __slots__ = ()
 
+    @property
+    def identity(self) -> str:
+        """What tells it from others of its class that may come to stand in its place."""
+        return ""
+
 
 class Held(NamedTuple):
     """The state of an object among plain data: it goes to the one that is in the same place."""
 
     kind: str
     state: Any
+    identity: str = ""
 
 
 def state_of(part: Any) -> Any:
@@ -138,8 +144,8 @@ def undoable() -> Iterator[None]:
 
 
 @cache
-def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str]]:
-    """Returns the slots of a class, and the names of attributes that are left as they are."""
+def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str], bool]:
+    """Returns a class's slots, names of attributes that are left as they are, and whether it is supplied."""
     slots: list[str] = []
     left: set[str] = set()
     for each in kind.__mro__:  # type: ignore[attr-defined]
@@ -148,7 +154,8 @@ def _layout(kind: Hashable) -> tuple[tuple[str, ...], frozenset[str]]:
             hidden = name.startswith("__") and not name.endswith("__")
             slots.append(f"_{each.__name__.lstrip('_')}{name}" if hidden else name)
         left.update(vars(each).get("non_persistent", ()))
-    return tuple(n for n in slots if n not in left | {"__dict__", "__weakref__"}), frozenset(left)
+    saved = tuple(n for n in slots if n not in left | {"__dict__", "__weakref__"})
+    return saved, frozenset(left), is_supplied(kind)
 
 
 def attributes_of(part: Any) -> dict[str, Any]:
@@ -158,7 +165,7 @@ def attributes_of(part: Any) -> dict[str, Any]:
         StateError: If one can't be saved.
     """
     kind: Any = type(part)
-    slots, left = _layout(kind)
+    slots, left, supplied = _layout(kind)
     state: dict[str, Any] = {}
     held = {name: getattr(part, name) for name in slots if hasattr(part, name)} if slots else {}
     if hasattr(part, "__dict__"):
@@ -168,7 +175,7 @@ def attributes_of(part: Any) -> dict[str, Any]:
             continue
         if type(value) in ATOMS:
             state[name] = value
-        elif not isinstance(value, Shared):
+        elif not isinstance(value, Shared) or (value.identity and not supplied):
             state[name] = _saved_as(value, kind, name)
     return state
 
@@ -176,7 +183,7 @@ def attributes_of(part: Any) -> dict[str, Any]:
 def put_attributes(part: Any, state: Mapping[str, Any], taken: Taken | None = None) -> None:
     """Gives an object what `attributes_of` has returned; what has come since goes. `taken`: see `Taken`."""
     kind: Any = type(part)
-    slots, left = _layout(kind)
+    slots, left, _ = _layout(kind)
     own = getattr(part, "__dict__", {})
     held = {**own, **{name: getattr(part, name, None) for name in slots}} if slots else own
     if (changed := _CHANGED.get()) is not None:
@@ -250,7 +257,7 @@ def _saved(value: Any) -> Any:
     if isinstance(value, np.generic) and value.dtype.kind in NUMBERS_AND_TEXTS:
         return value
     if isinstance(value, Shared):
-        return Held(kind.__qualname__, None)
+        return Held(kind.__qualname__, None, value.identity)
     if is_generator(value):
         try:
             return saved_generator(value)
@@ -283,9 +290,9 @@ def module_of(kind: type) -> str:
     return "__main__" if kind.__module__ == "__mp_main__" else kind.__module__
 
 
-def is_supplied(part: Any) -> bool:
-    """Returns whether an object's class comes along, and isn't a user's, which may hold anything."""
-    module = sys.modules.get(type(part).__module__)
+def is_supplied(kind: Any) -> bool:
+    """Returns whether a class comes along, and isn't a user's, which may hold anything."""
+    module = sys.modules.get(kind.__module__)
     return (getattr(module, "__file__", None) or "").startswith(SOURCES)
 
 
@@ -322,6 +329,10 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
         own: Any = type(current)
         if own.__qualname__ != saved.kind or (takes := _takes(own)) is None:
             raise StateError(f"there is no {saved.kind:.100} here to take the state of one")
+        if takes is _nothing and current.identity != saved.identity:
+            raise StateError(
+                f"it refers to '{current.identity}', and to {saved.identity!r:.100} in the snapshot"
+            )
         if takes is not _nothing and _has_taken(current, saved.state, taken):
             raise StateError(f"this {saved.kind:.100} is in two places, with another state in each")
         if takes is Stateful.load_state_dict:

@@ -74,6 +74,10 @@ class JointHandle(Shared, Stateful):
     effort: float = 0.0
     command: float = 0.0
 
+    @property
+    def identity(self) -> str:
+        return self.name
+
     def clamped(self, position: float) -> float:
         """Returns `position` within the limits of a revolute or prismatic joint."""
         limits = self.limits

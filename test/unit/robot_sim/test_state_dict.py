@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from robot_sim.control.joint import JointHandle
 from robot_sim.plain_data import pack, unpack
 from robot_sim.state_dict import Held, Shared, StateError, Stateful, attributes_of, load, state_of, undoable
 
@@ -346,3 +347,23 @@ def test_arrays_keep_their_layout_and_what_a_view_showed():
     for each in (state, back):
         assert each["turned"].flags.f_contiguous
         assert each["turned"].tolist() == [[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]]
+
+
+class InTurn(Stateful):
+    """A user's, which drives one joint after the other."""
+
+    def __init__(self, *joints):
+        self.joints, self.active = list(joints), joints[0]
+
+
+def test_what_refers_to_another_joint_than_when_saved_is_named():
+    part = InTurn(JointHandle("a", "revolute"), JointHandle("b", "revolute"))
+    state = part.state_dict()
+    part.load_state_dict(state)
+    part.active = part.joints[1]
+    with pytest.raises(StateError, match=r"InTurn.active: it refers to 'b', and to 'a'"):
+        part.load_state_dict(state)
+    part.active = part.joints[0]
+    part.joints.reverse()
+    with pytest.raises(StateError, match=r"InTurn.joints: it refers to 'b', and to 'a'"):
+        part.load_state_dict(state)

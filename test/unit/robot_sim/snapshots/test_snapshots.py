@@ -130,6 +130,19 @@ def test_a_link_that_is_another_one_to_the_engine_since_is_refused_while_attache
         sim.world.detach(each)
 
 
+@pytest.mark.parametrize("change", ["delete", "load"])
+def test_it_saves_again_after_a_body_has_gone_that_touched_something(sim, change):
+    model = sim.world.spawn("cube", parse_urdf(cube()), Pose((0.0, 0.0, 0.03)))
+    future(sim, 40)
+    sim.save_state()
+    if change == "delete":
+        sim.delete_model(model)
+    else:
+        inertia = model.description.links["cube_link"].inertia
+        sim.world.set_inertia(model, "cube_link", replace(inertia, com=OFF_CENTRE))
+    sim.restore_state(sim.save_state())
+
+
 def test_models_come_back_in_their_order_of_the_engine(sim):
     """A link with another centre of mass is loaded anew, and meets the others in another order."""
     lower, upper = (
