@@ -76,15 +76,19 @@ def _section(section: Section) -> str:
     others = [(path, row) for path, row in named if row.answer != READ]
     for _, group in groupby(others, key=lambda each: (each[1].answer, each[1].why, not each[1].default)):
         rows = list(group)
-        lines.append(f"- {', '.join(_listed(rows))}{_warning(rows)}: {rows[0][1].why}")
+        own = len({row.default for _, row in rows}) > 1  # each has its own default
+        lines.append(f"- {', '.join(_listed(rows, own))}{_warning(rows, own)}: {rows[0][1].why}")
     lines += [""] if others else []
     return "\n".join(lines)
 
 
-def _listed(rows: list[tuple[str, Row]]) -> Iterator[str]:
-    """Yields the names of rows: those below the same element after that one."""
+def _listed(rows: list[tuple[str, Row]], defaults: bool = False) -> Iterator[str]:
+    """Yields the names of rows, with defaults if wanted: those below the same element after that one."""
     for outer, group in groupby(rows, key=lambda each: each[0].rpartition("/")[0]):
-        names = [_name(path.rpartition("/")[2], row) for path, row in group]
+        names = [
+            _name(path.rpartition("/")[2], row) + (f" ({_values(row.default)})" if defaults else "")
+            for path, row in group
+        ]
         if len(names) == 1:
             yield names[0].replace("`", f"`{outer}/", 1) if outer else names[0]
         elif outer:
@@ -103,10 +107,10 @@ def _name(name: str, row: Row) -> str:
     return f"[`{name}`](#{anchor})"
 
 
-def _warning(rows: list[tuple[str, Row]]) -> str:
+def _warning(rows: list[tuple[str, Row]], shown: bool) -> str:
     if rows[0][1].answer != WARNED:
         return ""
-    values = " / ".join(dict.fromkeys(_values(row.default) for _, row in rows))
+    values = "so" if shown else _values(rows[0][1].default)
     return f" (warning unless {values})" if values else " (warning)"
 
 

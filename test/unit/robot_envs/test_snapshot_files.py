@@ -83,6 +83,23 @@ def test_a_fresh_process_goes_on_to_the_bit(identifier, backend, tmp_path):
     assert done.stdout.rpartition("played ")[2].strip() == first
 
 
+def test_an_environment_of_this_process_goes_on_from_a_file(tmp_path):
+    env, other = (
+        gymnasium.make("cartpole/Balance-v0", sensor_noise=0.01, sensor_delay=2).unwrapped for _ in range(2)
+    )
+    env.reset(seed=1)
+    play(env)
+    env.save_state().save(tmp_path / "hard.snapshot")
+    first = play(env)
+    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))  # before any reset
+    assert play(other) == first
+    other.reset(seed=5)
+    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))
+    assert play(other) == first
+    with pytest.raises(SnapshotError, match=r"none\.snapshot: .*No such file"):
+        EnvSnapshot.load(tmp_path / "none.snapshot")
+
+
 def test_scripts_share_their_classes_with_the_processes_that_they_spawn(monkeypatch):
     class Short(SwingUpTask):
         def __init__(self):

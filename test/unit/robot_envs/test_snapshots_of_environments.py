@@ -15,7 +15,6 @@ from cartpole.robot import ROBOT
 from cartpole.tasks import BalanceTask
 from robot_envs import EnvSnapshot, InitialState, InitialStates, RobotEnv, SimulatorError, diff
 from robot_envs.variation import Variation
-from robot_sim.snapshot import SnapshotError
 
 
 class Remembering(BalanceTask):
@@ -248,20 +247,6 @@ def test_a_task_shares_the_environments_generator_again(made, begun):
     other.restore_state(snapshot)
     env.restore_state(snapshot)
     assert returns(other) == returns(env)
-
-
-def test_another_environment_goes_on_from_a_file(made, begun, tmp_path):
-    env, other = (make(sensor_noise=0.01, sensor_delay=2) for make in (begun, made))
-    returns(env, 7)
-    env.save_state().save(tmp_path / "hard.snapshot")
-    first = returns(env)
-    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))  # before any reset
-    assert returns(other) == first
-    other.reset(seed=5)
-    other.restore_state(EnvSnapshot.load(tmp_path / "hard.snapshot"))
-    assert returns(other) == first
-    with pytest.raises(SnapshotError, match=r"none\.snapshot: .*No such file"):
-        EnvSnapshot.load(tmp_path / "none.snapshot")
 
 
 def test_an_episode_begins_at_a_snapshot(begun):
