@@ -36,6 +36,8 @@ class GripperCase(WorldCase):
         self.assertTrue(Manager().start(*CONTROLLERS))
         self.addCleanup(self.unload)
         self.client = actionlib.SimpleActionClient("/grip/gripper_cmd", GripperCommandAction)
+        # Else the next one may take a connection to this controller, which goes, for one to its own.
+        self.addCleanup(self.client.action_client.stop)
         self.assertTrue(wait_until(self.client.wait_for_server))
 
     def unload(self):
