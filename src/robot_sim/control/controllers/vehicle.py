@@ -50,7 +50,7 @@ def _limits(axis: str) -> Callable[[Any, str], SpeedLimits]:
     return read
 
 
-LIMITS = "`{}/`: `has_velocity_limits`, `max_velocity`, `min_velocity` (minus the most); accelerations, jerks"
+LIMITS = "`{}/`: `has_velocity_limits`, `max_velocity`, `min_velocity` (-max); so `acceleration`, `jerk`"
 
 
 class VehicleParameters(Parameters):
