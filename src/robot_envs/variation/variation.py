@@ -8,14 +8,14 @@ import numpy as np
 
 from robot_sim.physics.description import Inertia
 from robot_sim.physics.dynamics import tensor_in
-from robot_sim.physics.pose import IDENTITY, ZERO, Quaternion, Vector, conjugate
+from robot_sim.physics.pose import IDENTITY, ZERO, Vector, conjugate
 
 
 class LinkScale(NamedTuple):
     """How a link's inertia differs.
 
     The length is measured along an axis of the link's frame: the distance of the centre of mass and the
-    moments scale with it. Shapes and joints stay where they are.
+    spread of the mass about it scale with it. Shapes and joints stay where they are.
     """
 
     mass: float = 1.0  # factor
@@ -80,11 +80,6 @@ class Randomisation(Protocol):
         """Draws a variation; returns it, and what the reset's `info["variation"]` reports."""
 
 
-_AXES = {  # of a length: index, the moments that scale with its square, the products that scale with it
-    "x": (0, ("iyy", "izz"), ("ixy", "ixz")),
-    "y": (1, ("ixx", "izz"), ("ixy", "iyz")),
-    "z": (2, ("ixx", "iyy"), ("ixz", "iyz")),
-}
 _ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
@@ -95,27 +90,26 @@ def length_axis(inertia: Inertia) -> str:
 
 
 def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
-    """Returns a link's inertia as a variation changes it, as if the link were a rod.
+    """Returns a link's inertia as a variation changes it, as if all its mass were stretched along the length.
 
-    Moments about axes across the length scale with its square; the moment about it doesn't change.
+    So the integral of z² over the mass scales with the square of a length along z, those of x² and y² don't.
     """
-    index, moments, products = _AXES[scale.axis]
-    mass, length = scale.mass, scale.length
-    powers = dict.fromkeys(moments, mass * length * length) | dict.fromkeys(products, mass * length)
-    turned = inertia.com.orientation
-    if length == 1.0 or turned == IDENTITY:
-        tensor = {key: getattr(inertia, key) * powers.get(key, mass) for key in _ENTRIES}
-    else:  # the tensor is given in axes of its own, the length along one of the link's
-        straight = _turned(inertia, IDENTITY)
-        tensor = {key: value * powers.get(key, mass) for key, value in straight.items()}
-        tensor = _turned(Inertia(inertia.mass, **tensor), conjugate(turned))
+    index, turned = "xyz".index(scale.axis), inertia.com.orientation
+    tensor = {key: getattr(inertia, key) for key in _ENTRIES}
+    if scale.length != 1.0:
+        straight = tensor_in(inertia, IDENTITY)  # the length is along one of the link's axes
+        spread = np.trace(straight) / 2.0 * np.eye(3) - straight
+        spread[index] *= scale.length
+        spread[:, index] *= scale.length
+        straight = Inertia(inertia.mass, **_entries(np.trace(spread) * np.eye(3) - spread))
+        tensor = _entries(tensor_in(straight, conjugate(turned)))
+    tensor = {key: scale.mass * value for key, value in tensor.items()}
     place = list(inertia.com.position)
-    place[index] *= length
+    place[index] *= scale.length
     x, y, z = (value + off for value, off in zip(place, scale.com, strict=True))
     com = inertia.com._replace(position=(x, y, z))
-    return replace(inertia, mass=inertia.mass * mass, com=com, **tensor)
+    return replace(inertia, mass=inertia.mass * scale.mass, com=com, **tensor)
 
 
-def _turned(inertia: Inertia, orientation: Quaternion) -> dict[str, float]:
-    tensor = tensor_in(inertia, orientation)
+def _entries(tensor: np.ndarray) -> dict[str, float]:
     return {key: float(tensor[place]) for key, place in _ENTRIES.items()}

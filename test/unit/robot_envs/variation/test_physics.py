@@ -79,14 +79,14 @@ def test_gains_drive_so_many_times_as_hard(factor):
 
 
 def test_a_length_moves_the_centre_and_its_moments():
-    """The wheel is as heavy as before; its moments about x and y are those of a longer rod."""
+    """The wheel is as heavy as before. Half of each moment about x or y is the integral of z², quadrupled."""
     env = vary(length={"wheel": (2.0, 2.0)}, com={"cart": (0.1, 0.1)})
     env.reset(seed=0)
     robot = next(each for each in env.backend._sim.robots)
     wheel, cart = (robot.model.description.links[name].inertia for name in ("wheel", "cart"))
     env.close()
     assert wheel.com.position == pytest.approx((0.0, 0.0, 0.4))
-    assert (wheel.mass, wheel.ixx, wheel.izz) == pytest.approx((1.0, 4 * INERTIA, INERTIA))
+    assert (wheel.mass, wheel.ixx, wheel.izz) == pytest.approx((1.0, 2.5 * INERTIA, INERTIA))
     assert cart.com.position == pytest.approx((0.1, 0.1, 0.3))
 
 
