@@ -1,6 +1,6 @@
 """The scene for windows: looks, link poses, and contacts of the world.
 
-An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 7), so the service and the topics
+An empty world offers exactly what Gazebo's does (docs/contract/gazebo.md 1.4), so the service and the topics
 come when a window asks for them through the node's XML-RPC server (`world_services.WorldControl`).
 """
 

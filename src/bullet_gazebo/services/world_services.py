@@ -242,7 +242,7 @@ class WorldControl:
 
     Every ROS node answers XML-RPC calls of master and tools. The simulator answers one more: any machine
     finds it by the node's name, and it is neither a topic nor a service, of which there must be only
-    Gazebo's own (docs/contract/gazebo.md 7).
+    Gazebo's own (docs/contract/gazebo.md 1.4).
     """
 
     def __init__(
