@@ -95,12 +95,9 @@ class Clock:
             return any(each.thread == ident for each in self._sleepers)
 
     def wait(
-        self,
-        seconds: float,
-        until: Condition | None = None,
-        topics: Collection[str] = (),
+        self, seconds: float, until: Condition | None = None, topics: Collection[str] = (),
         in_pause: float = math.inf,
-    ) -> bool:
+    ) -> bool:  # fmt: skip
         """Blocks the calling thread in simulated time [s]; returns whether `until` became true before.
 
         That is checked after messages (those on `topics` may make it true), callbacks and other threads'

@@ -114,12 +114,9 @@ class ScriptRunner:
 
     @_ends_with_the_world(False)
     def wait(
-        self,
-        seconds: float,
-        until: Condition | None = None,
-        topics: Collection[str] = (),
+        self, seconds: float, until: Condition | None = None, topics: Collection[str] = (),
         in_pause: float = math.inf,
-    ) -> bool:
+    ) -> bool:  # fmt: skip
         """As Clock.wait."""
         self._settle()
         before = self.clock.waits

@@ -92,11 +92,9 @@ class ScriptWorld:
         return bool(self._pending) or self._physics != AdvanceWorldRequest.AS_IT_IS
 
     def advance(
-        self,
-        ticks: int,
-        until: Sequence[str] = (),
+        self, ticks: int, until: Sequence[str] = (),
         connect: tuple[Sequence[str], Sequence[str]] | None = None,
-    ) -> AdvanceWorldResponse:
+    ) -> AdvanceWorldResponse:  # fmt: skip
         """Lets at most `ticks` pass, `longest` in one call, and exchanges messages.
 
         The call ends after the first tick with a message on one of the topics `until`. `connect` are topics

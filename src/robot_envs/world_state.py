@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from file_access.text import did_you_mean
+from robot_sim.physics.engine import seen_from
 from robot_sim.physics.pose import ZERO, Pose, Vector
-from robot_sim.physics.world import seen_from
 from robot_sim.sensors.sensor_reading import Reading
 from robot_sim.state import ContactPair, LinkQuery, StateQuery
 

@@ -4,15 +4,17 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, fields, is_dataclass
+from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from robot_sim.applied_forces import ActingTime
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.joint import JointHandle
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
 from robot_sim.physics.model import NO_STOP
-from robot_sim.physics.pose import Pose
+from robot_sim.physics.pose import ZERO, Pose
 from robot_sim.physics.world import World
 from robot_sim.plain_data import LARGEST, entries_of, is_within, misfit
 from robot_sim.robot import ControlledRobot
@@ -31,16 +33,15 @@ OFF_LENGTH = 1e-3  # of a unit quaternion
 def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, Any]:
     """Returns what snapshots of a world fit, as plain data.
 
-    Controllers that claim no joint, such as those that publish, may differ. So may planes: a world without
-    ROS has none where nothing reaches them.
+    Controllers that claim no joint, such as those that publish, may differ. Planes may be missing: a world
+    without ROS has none where nothing reaches them.
     """
+    planes = {name for name, model in world.models.items() if model.description.is_plane}
+    digests = {name: _digest((each.description, each.initial_pose)) for name, each in world.models.items()}
     return {
         "engine": type(world.engine).__name__.removesuffix("Engine"),
-        "models": {
-            name: _digest((model.description, model.initial_pose))
-            for name, model in world.models.items()
-            if not model.description.is_plane
-        },
+        "models": {name: each for name, each in digests.items() if name not in planes},
+        "planes": {name: each for name, each in digests.items() if name in planes},
         "robots": [
             {
                 "model": robot.model.name,
@@ -82,13 +83,16 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     if not isinstance(models, dict) or set(models) != set(own):
         there = sorted(map(str, models)) if isinstance(models, dict) else models
         return f"the snapshot has the models {there!r:.300}, and here are {sorted(own)}"
-    if others := [name for name in own if models[name] != own[name]]:
+    others = [name for name in own if models[name] != own[name]]
+    planes = given["planes"] if isinstance(given.get("planes"), dict) else {}
+    others += [name for name, digest in here["planes"].items() if planes.get(name, digest) != digest]
+    if others:
         return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
-    if given.get("robots") != here["robots"]:
-        return (
-            "the controllers that run aren't those of the snapshot: "
-            f"{given.get('robots')!r:.200} in it, and here {here['robots']!r:.200}"
-        )
+    robots = given["robots"] if isinstance(given.get("robots"), list) else []
+    for one, other in zip_longest(robots, here["robots"]):
+        if one != other:
+            told = f"{one!r:.200} in it, and here {other!r:.200}"
+            return f"the controllers that run aren't those of the snapshot: {told}"
     return ""
 
 
@@ -107,7 +111,13 @@ def check_foreign(
     known = {**before, "robots": [_known(*each) for each in pairs], "parts": own_parts}
     if fault := misfit(known, state):
         raise SnapshotError(fault)
-    faults = [] if 0 <= state["now"] < LARGEST // 2 else [f"its time is {state['now']}"]
+    applied, world, always = state["applied"], state["world"], ActingTime(0, -1)
+    examples = (
+        (("", "", 0.0, always), applied["efforts"]), (("", "", (ZERO, ZERO), always), applied["wrenches"]),
+        ((("", ""), ("", ""), Pose(), 0), world["attachments"]), (Pose(), world["fastened"].values()),
+    )  # fmt: skip
+    faults = [misfit(example, each, "world", exactly=True) for example, some in examples for each in some]
+    faults += [] if 0 <= state["now"] < LARGEST // 2 else [f"its time is {state['now']}"]
     physics = [state["world"], state["applied"], [each["efforts"] for each in state["robots"]]]
     if not is_within(physics, NO_STOP):
         faults.append("positions, velocities, forces or efforts are too large, or NaN")
@@ -117,7 +127,9 @@ def check_foreign(
     there = set(state["world"]["models"])
     faults += [f"it lacks '{each}'" for each in state["world"]["order"] if each not in there]
     for robot, one, other in zip(robots, before["robots"], state["robots"], strict=True):
-        faults.append(misfit(_needed(one), _needed(other), robot.model.name, exactly=True))
+        faults.append(misfit(0, other["waited"] or 0, "waited"))
+        own, given = (_needed(each, _claiming(robot)) for each in (one, other))
+        faults.append(misfit(own, given, robot.model.name, exactly=True))
         absent, others = ([*_absent([each["hardware"], each["efforts"]])] for each in (one, other))
         if not faults[-1] and absent != others:
             faults.append(f"numbers of {robot.model.name}'s joints are missing")
@@ -131,7 +143,7 @@ def check_foreign(
 
 def _known(robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a robot's state without users' controllers, and publishing ones that the other lacks."""
-    claiming = {each.name for each in robot.manager.running if any(each.claims.values())}
+    claiming = _claiming(robot)
     manager, there = own["manager"], given["manager"]["controllers"]
     kept = {
         name: each
@@ -144,10 +156,14 @@ def _known(robot: ControlledRobot, own: Mapping[str, Any], given: Mapping[str, A
     return {**own, "manager": {**manager, "controllers": kept}}
 
 
-def _needed(robot: Mapping[str, Any]) -> dict[str, Any]:
+def _claiming(robot: ControlledRobot) -> set[str]:
+    return {each.name for each in robot.manager.running if any(each.claims.values())}
+
+
+def _needed(robot: Mapping[str, Any], running: set[str]) -> dict[str, Any]:
     """Returns of a robot's state what a tick can't do without."""
-    controllers = robot["manager"]["controllers"].items()
-    loops = {name: own.get("pids") for name, own in controllers if isinstance(own, dict)}
+    own = [(name, each) for name, each in robot["manager"]["controllers"].items() if name in running]
+    loops = {name: each.get("pids") for name, each in own if isinstance(each, dict)}
     pids = {name: own for name, own in loops.items() if own}
     return {"hardware": robot["hardware"], "efforts": robot["efforts"], "pids": pids}
 

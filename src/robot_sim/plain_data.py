@@ -193,7 +193,8 @@ def _unpack(data: bytes, depth: int, count: Counter[str]) -> Any:
             return flat.reshape(shape, order="F" if order == ["F"] else "C")
         if code == SCALAR:
             dtype, number = given
-            return np.frombuffer(number, _dtype(dtype), 1)[0]
+            kind = _dtype(dtype)
+            return np.frombuffer(number, kind, 1)[0] if kind.itemsize else kind.type()  # an empty text
         if code == DEQUE:
             most, entries = given
             return deque(counted(entries, OF_A_DEQUE), most)
@@ -316,7 +317,7 @@ def is_within(value: Any, most: float) -> bool:
     if isinstance(value, (list, tuple, dict)):
         entries = value.values() if isinstance(value, dict) else value
         return all(is_within(each, most) for each in entries)
-    return not isinstance(value, (float, np.ndarray)) or bool(np.all(np.abs(value) <= most))
+    return not isinstance(value, (int, float, np.number, np.ndarray)) or bool(np.all(np.abs(value) <= most))
 
 
 def differences(first: Any, second: Any, place: str = "") -> Iterator[Difference]:

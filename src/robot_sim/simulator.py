@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 from file_access.text import one_line
 from robot_sim.applied_forces import AppliedForces
@@ -21,20 +21,14 @@ from robot_sim.plain_data import resolve
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import Shared, StateError, load, state_of, undoable
-from robot_sim.timing import FairLock, Holds, Pacer
+from robot_sim.timing import FairLock, Holds, Outbox, Pacer
 
 STALL_CHECK = 100_000_000  # [ns]
 IDLE_POLL = 0.2  # [s]; how soon an idle run() notices stop()
 
 
-class Outbox(Protocol):
-    """Sends clients what a tick has produced, after the tick."""
-
-    def has_messages(self) -> bool:
-        """Returns whether there is something to send. The caller holds the lock."""
-
-    def deliver(self) -> None:
-        """Sends it. The caller doesn't hold the lock."""
+def _refusal(error: Exception) -> SnapshotError:
+    return SnapshotError(one_line(f"the snapshot can't be restored: {error!s:.300}"))
 
 
 class NotInLockstep(RuntimeError):
@@ -275,7 +269,7 @@ class Simulator(Shared):
         Raises StateError if the state of a user's controller or plugin can't be saved.
         """
         state = {
-            "robots": [robot.state_dict() for robot in self.robots],
+            "robots": [robot.state_dict() for robot in self._by_name],
             "parts": {name: state_of(part) for name, part in self.parts.items()},
             "applied": self.applied.state_dict(), "now": self.now, "resets": self.resets,
             "world": self.world.state_dict(),
@@ -295,22 +289,38 @@ class Simulator(Shared):
         if snapshot.fits is not self.fits and (fault := misfits(snapshot.fits, self.fits)):
             raise SnapshotError(fault)
         if not snapshot.is_foreign:
-            self.world.check_state(snapshot.state["world"])
-            self._load(snapshot.state)
+            self._check(snapshot.state)
+            try:
+                self._load(snapshot.state)
+            finally:
+                self._tell_restored()
             return
         before = self.save_state().state
         try:
             state = resolve(snapshot.state)
-            check_foreign(self.robots, self.parts, before, state)
-            self.world.check_state(state["world"])
+            check_foreign(self._by_name, self.parts, before, state)
+            self._check(state)
+        except Exception as error:  # whatever a forged state raises
+            raise _refusal(error) from error
+        try:
             with undoable():
                 self._load(state)
-        except BaseException as error:  # whatever a forged state raises, and Ctrl-C
+        except BaseException as error:  # Ctrl-C, too
             with contextlib.suppress(StateError):  # of a user's class
                 self._load(before)
             if not isinstance(error, Exception):
                 raise
-            raise SnapshotError(one_line(f"the snapshot can't be restored: {error!s:.300}")) from error
+            raise _refusal(error) from error
+        self._tell_restored()
+
+    @property
+    def _by_name(self) -> list[ControlledRobot]:
+        """The robots in an order that doesn't depend on when they came."""
+        return sorted(self.robots, key=lambda robot: (robot.model.name, robot.namespace))
+
+    def _check(self, state: Mapping[str, Any]) -> None:
+        pushed = [(name, link) for name, link, *_ in state["applied"]["wrenches"]]
+        self.world.check_state(state["world"], pushed)
 
     def _load(self, state: Mapping[str, Any]) -> None:
         self.world.load_state_dict(state["world"])
@@ -318,25 +328,27 @@ class Simulator(Shared):
         self.applied.load_state_dict(state["applied"], self.world.models)
         parts, faults = state["parts"], []
         there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
-        robots = zip(self.robots, state["robots"], strict=True)
+        robots = zip(self._by_name, state["robots"], strict=True)
         for loads in (*(partial(robot.load_state_dict, own) for robot, own in robots), partial(load, there)):
             try:
                 loads()
             except StateError as error:  # of a user's class; all else is restored
                 faults.append(str(error))
+        if faults:
+            raise StateError("; ".join(faults))
+
+    def _tell_restored(self) -> None:
         for robot in self.robots:
             robot.manager.restored()
         for listener in self.restored:
             listener()
-        if faults:
-            raise StateError("; ".join(faults))
 
     @property
     def fits(self) -> dict[str, Any]:
         """What a world must share to restore its snapshots. The caller holds the lock."""
         version = self.version, [robot.manager.running for robot in self.robots]
         if self._fits_version != version:
-            self._fits_version, self._fits = version, fingerprint(self.world, self.robots)
+            self._fits_version, self._fits = version, fingerprint(self.world, self._by_name)
         return self._fits
 
     def reseed(self, seed: int) -> None:

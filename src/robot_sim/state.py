@@ -13,11 +13,11 @@ import numpy as np
 
 from file_access.text import did_you_mean
 from robot_sim.physics.description import Shape
-from robot_sim.physics.engine import Side, Twist
+from robot_sim.physics.engine import Side, Twist, seen_from
 from robot_sim.physics.lumping import WORLD
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import ZERO, Pose, Vector, add, conjugate, cross, rotate, scale, subtract
-from robot_sim.physics.world import World, seen_from
+from robot_sim.physics.world import World
 
 SCOPE = "::"
 Wrench = tuple[Vector, Vector]

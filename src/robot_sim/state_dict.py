@@ -356,7 +356,16 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
     if kind is deque:
         there = [*current] if isinstance(current, deque) else ()
         return deque(_loaded(there, [*saved], taken), saved.maxlen)
-    return _saved(saved)
+    names = getattr(kind, "_fields", None) or (hasattr(kind, "__dataclass_fields__") and fields_of(kind))
+    if not names:
+        return _saved(saved)
+    values = [_loaded(getattr(current, name, None), getattr(saved, name), taken) for name in names]
+    if issubclass(kind, tuple):
+        return tuple.__new__(kind, values)
+    made = copy.copy(saved)
+    for name, value in zip(names, values, strict=True):
+        object.__setattr__(made, name, value)
+    return made
 
 
 def _loaded_generator(current: Any, saved: Mapping[str, Any], taken: Taken | None) -> Any:

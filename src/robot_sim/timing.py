@@ -1,4 +1,4 @@
-"""The world's lock, holds on its time, and its pace against the wall clock."""
+"""The world's lock, holds on its time, its pace against the wall clock, and what is sent after a tick."""
 
 import math
 import threading
@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from robot_sim.state_dict import Shared
 
@@ -201,3 +202,13 @@ class Pacer:
         if delay > 0.0:
             time.sleep(min(delay, longest))
         return delay <= longest
+
+
+class Outbox(Protocol):
+    """Sends clients what a tick has produced, after the tick."""
+
+    def has_messages(self) -> bool:
+        """Returns whether there is something to send. The caller holds the lock."""
+
+    def deliver(self) -> None:
+        """Sends it. The caller doesn't hold the lock."""

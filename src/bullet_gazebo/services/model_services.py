@@ -19,11 +19,11 @@ from bullet_gazebo.common.messages import (
 )
 from bullet_gazebo.services import NO_LINK, NO_MODEL, SCOPE, ServiceRefused, check_message, existing, offer
 from robot_sim.physics.description import DescriptionError
-from robot_sim.physics.engine import Twist
+from robot_sim.physics.engine import Twist, seen_from
 from robot_sim.physics.model import AT_REST
 from robot_sim.physics.pose import Pose, rotate, subtract
 from robot_sim.physics.properties import PropertyError, link_inertia, set_link_properties
-from robot_sim.physics.world import WORLD_FRAMES, seen_from
+from robot_sim.physics.world import WORLD_FRAMES
 from robot_sim.simulator import Simulator
 
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

@@ -30,10 +30,12 @@ from bullet_gazebo.services import NO_LINK, ServiceRefused, existing, offer
 from bullet_gazebo.services.step_requests import MAX_TICKS, SLICE, Addresses, Commanded, StepPlan, query_of
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.properties import PropertyError, set_link_friction
+from robot_sim.plain_data import misfit
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, find_sensor
 from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, StateReader, UnknownName
+from robot_sim.state_dict import StateError
 
 MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
 COUNTED = 24  # [bits] of a handle that count; those above are the simulator's
@@ -193,7 +195,10 @@ class StepService:
             return
         self._sense(state["sensors"])
         assert self._readers is not None
-        self._readers.load_state_dict(state["readers"])
+        own, given = self._readers.state_dict(), state["readers"]
+        if own.keys() != given.keys() or misfit(own, given):
+            raise StateError(f"the readers of sensors have {given!s:.200}")
+        self._readers.load_state_dict(given)
 
     def _end_readers(self) -> None:
         if self._readers:

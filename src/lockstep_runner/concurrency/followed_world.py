@@ -20,11 +20,9 @@ class FollowedWorld(ScriptWorld):
         self._line = line
 
     def advance(
-        self,
-        ticks: int,
-        until: Sequence[str] = (),
+        self, ticks: int, until: Sequence[str] = (),
         connect: tuple[Sequence[str], Sequence[str]] | None = None,
-    ) -> AdvanceWorldResponse:
+    ) -> AdvanceWorldResponse:  # fmt: skip
         """As ScriptWorld.advance, but time passes only when the script's process says so."""
         if not ticks:
             return super().advance(0, (), connect)

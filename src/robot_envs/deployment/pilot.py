@@ -105,16 +105,9 @@ class Pilot:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        act: Callable[[Any], Any],
-        period: float,
-        seed: int = 0,
-        goal: Any = None,
-        way: float = 1.0,
-        say: Say = print,
-    ) -> None:
+        self, robot: Robot, task: Task, act: Callable[[Any], Any], period: float, seed: int = 0,
+        goal: Any = None, way: float = 1.0, say: Say = print,
+    ) -> None:  # fmt: skip
         self._scene, self._task, self._act, self._say = Scene([robot]), task, act, say
         if not robot.ports:
             raise RobotEnvError(f"the robot '{robot.model}' has no controller that takes commands")

@@ -50,16 +50,9 @@ class PolicyNode:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        task: Task,
-        act: Callable[[Any], Any],
-        period: float,
-        late: float | None = None,
-        seed: int = 0,
-        goal: Any = None,
-        way: float = 1.0,
-    ) -> None:
+        self, robot: Robot, task: Task, act: Callable[[Any], Any], period: float,
+        late: float | None = None, seed: int = 0, goal: Any = None, way: float = 1.0,
+    ) -> None:  # fmt: skip
         self._period = period
         self._late = _late(robot, period) if late is None else late
         try:

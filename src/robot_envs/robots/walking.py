@@ -107,23 +107,12 @@ class WalkByCommand(Task):
     }  # fmt: skip
 
     def __init__(
-        self,
-        robot: Robot,
-        stance: Mapping[str, float],
-        height: float,
-        imu: str | None,
-        feet: Sequence[str],
-        phases: Sequence[float],
-        period: float = 0.4,
-        lift: float = 0.08,
-        reach: float = 0.15,
-        ahead: tuple[float, float] = (-0.5, 0.8),
-        aside: float = 0.6,
-        about: float = 1.0,
-        push: float = 0.2,
-        shove: float = 0.0,
+        self, robot: Robot, stance: Mapping[str, float], height: float, imu: str | None,
+        feet: Sequence[str], phases: Sequence[float], period: float = 0.4, lift: float = 0.08,
+        reach: float = 0.15, ahead: tuple[float, float] = (-0.5, 0.8), aside: float = 0.6,
+        about: float = 1.0, push: float = 0.2, shove: float = 0.0,
         weights: Mapping[str, float] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         unknown = set(weights or ()) - set(self.WEIGHTS)
         if unknown or len(feet) != len(phases):
             raise TaskError(

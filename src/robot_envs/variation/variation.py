@@ -101,8 +101,8 @@ def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
         spread = np.trace(straight) / 2.0 * np.eye(3) - straight
         spread[index] *= scale.length
         spread[:, index] *= scale.length
-        straight = Inertia(inertia.mass, **_entries(np.trace(spread) * np.eye(3) - spread))
-        tensor = _entries(tensor_in(straight, conjugate(turned)))
+        longer = Inertia(inertia.mass, **_entries(np.trace(spread) * np.eye(3) - spread))
+        tensor = _entries(tensor_in(longer, conjugate(turned)))
     tensor = {key: scale.mass * value for key, value in tensor.items()}
     place = list(inertia.com.position)
     place[index] *= scale.length
@@ -111,5 +111,5 @@ def scaled(inertia: Inertia, scale: LinkScale) -> Inertia:
     return replace(inertia, mass=inertia.mass * scale.mass, com=com, **tensor)
 
 
-def _entries(tensor: np.ndarray) -> dict[str, float]:
+def _entries(tensor: np.ndarray) -> dict[str, Any]:
     return {key: float(tensor[place]) for key, place in _ENTRIES.items()}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from robot_sim.physics.description import DescriptionError, Inertia, ModelDescription
-from robot_sim.physics.pose import ZERO, Pose, Vector
+from robot_sim.physics.pose import ZERO, Pose, Vector, conjugate, rotate, subtract
 
 Twist = tuple[Vector, Vector]
 """Linear [m/s] and angular [rad/s] velocity in world axes."""
@@ -220,13 +220,22 @@ class Engine(ABC):
         """Returns the bodies in the order in which they were loaded: the solver's result may depend on it."""
 
     @abstractmethod
-    def fastened(self) -> dict[int, Any]:
-        """Returns what `fasten` has fixed, by number, as plain data."""
+    def fastened(self) -> dict[int, Pose]:
+        """Returns where each second link is kept, by number, as the engine has it."""
 
     @abstractmethod
-    def refasten(self, fastened: Mapping[int, Any]) -> None:
-        """Fixes what was `fastened` at another time, and nothing else."""
+    def refasten(self, welds: Mapping[int, tuple[LinkOf, LinkOf, Pose]]) -> None:
+        """Keeps these links, and no others, where they were `fastened` at another time."""
 
     @abstractmethod
     def close(self) -> None:
         """Frees the engine's memory; it can't be used afterwards."""
+
+
+def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:
+    """Returns a state relative to a frame, as Gazebo does: without the ω × r term."""
+    back = conjugate(frame[0].orientation)
+    linear, angular = (
+        rotate(back, subtract(own, other)) for own, other in zip(state[1], frame[1], strict=True)
+    )
+    return state[0].relative_to(frame[0]), (linear, angular)

@@ -277,13 +277,12 @@ class Model(Shared):
             body.set_gear(name, 0.0)
 
     def properties(self) -> tuple[object, ...]:
-        """Returns what services change of it: what a snapshot of the world doesn't bring back."""
+        """Returns what services change of it, which a snapshot of the world doesn't bring back."""
         links = {} if self.description.static else self.description.links
         joints = self.description.joints
         return (
             tuple([(link.inertia, link.gravity) for link in links.values()]),
             tuple([(each.kind, each.lower, each.upper, each.damping) for each in joints.values()]),
-            {name: added for name, added in self.damping_added.items() if added},
             {link: factor for link, factor in self._grip.items() if factor != 1.0},
         )
 

@@ -10,7 +10,7 @@ from robot_sim.physics.description import DescriptionError, Inertia, Light, Link
 from robot_sim.physics.engine import Body, Contact, Engine, EngineSettings, Side, Twist
 from robot_sim.physics.entity_names import EntityNames
 from robot_sim.physics.model import AT_REST, Model
-from robot_sim.physics.pose import Pose, Vector, conjugate, rotate, subtract
+from robot_sim.physics.pose import Pose, Vector
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import Shared
 
@@ -18,8 +18,7 @@ GRAVITY: Vector = (0.0, 0.0, -9.8)  # [m/s²], Gazebo's default
 TIME_STEP = 0.001  # [s], Gazebo's default
 MOST_ITERATIONS = 1000  # of the solver in a step; more would only block the world
 WORLD_FRAMES = ("", "world", "map", "/map")
-PROPERTIES = ("inertia or gravity of a link", "stop or damping of a joint", "damping of a joint by its gains",
-              "friction of a link")  # fmt: skip
+PROPERTIES = "inertia or gravity of a link", "stop or damping of a joint", "friction of a link"
 """What `Model.properties` returns, in order."""
 
 
@@ -273,7 +272,7 @@ class World(Shared):
         again, but PyBullet's solver starts without the forces of the last one.
         """
         contacts, fastened = self.contacts(), self.engine.fastened()
-        self.engine.refasten(fastened)  # in the order that a load leads to
+        self._refasten(fastened)  # in the order that a load leads to
         names = {id(model.body): name for name, model in self.models.items()}
         state = {
             "models": {name: model.state_dict() for name, model in self.models.items()},
@@ -293,6 +292,14 @@ class World(Shared):
         self._recall(contacts)
         return state
 
+    def _refasten(self, fastened: Mapping[int, Pose]) -> None:
+        ends = {each.number: (each.first, each.second) for each in self.attachments}
+        welds = {}
+        for number, pose in fastened.items():
+            (one, link), (other, its) = ends[number]
+            welds[number] = (one.body, link), (other.body, its), pose
+        self.engine.refasten(welds)
+
     def _order(self) -> list[str]:
         """Returns the names of the models in the engine's order, without planes (`fingerprint`)."""
         solid = [model for model in self.models.values() if not model.description.is_plane]
@@ -303,8 +310,8 @@ class World(Shared):
         self.engine.forget_contacts()
         self._recalled = contacts
 
-    def check_state(self, state: Mapping[str, Any]) -> None:
-        """Checks that a state fits this world.
+    def check_state(self, state: Mapping[str, Any], pushed: Iterable[tuple[str, str]] = ()) -> None:
+        """Checks that a state fits this world, and that it has `pushed`, models with their links.
 
         Raises SnapshotError if the models or their properties have changed.
         """
@@ -315,7 +322,13 @@ class World(Shared):
             raise SnapshotError(
                 f"it has the models {state['order']!r:.300}, and here are {self._order()!r:.300}"
             )
-        attached = {name for each in state["attachments"] for name, _ in each[:2]}
+        ends = [end for each in state["attachments"] for end in each[:2]]
+        attached = {name for name, _ in ends}
+        if sorted(state["fastened"]) != sorted(number for *_, number in state["attachments"]):
+            raise SnapshotError("its attachments aren't what is fastened")
+        for name, link in (*ends, *pushed):
+            if name not in self.models or link not in self.models[name].link_names:
+                raise SnapshotError(f"something acts on the link '{name}::{link}', which isn't here")
         touched = {side[0] for each in state["contacts"] for side in each[5:]}
         if missing := sorted(touched - set(self.models)):
             raise SnapshotError(f"something touches the model '{missing[0]}', which isn't here")
@@ -343,12 +356,12 @@ class World(Shared):
             self._reload(models[name])
             models[name].apply_damping(self.time_step)
         known = {(a.first, a.second, a.pose, a.number): a for a in self.attachments}
-        self.engine.refasten(state["fastened"])
         made_of = [
             ((models[one], link), (models[two], its), pose, number)
             for (one, link), (two, its), pose, number in state["attachments"]
         ]
         self.attachments = [known.get(each) or Attachment(*each) for each in made_of]
+        self._refasten(state["fastened"])
         for name, own in state["models"].items():
             if name in models:
                 models[name].load_state_dict(own)
@@ -379,15 +392,6 @@ class World(Shared):
         self._special = [model for model in self.models.values() if passive_forces.are_on(model)]
         for model in models:
             self._names.add(model)
-
-
-def seen_from(state: tuple[Pose, Twist], frame: tuple[Pose, Twist]) -> tuple[Pose, Twist]:
-    """Returns a state relative to a frame, as Gazebo does: without the ω × r term."""
-    back = conjugate(frame[0].orientation)
-    linear, angular = (
-        rotate(back, subtract(own, other)) for own, other in zip(state[1], frame[1], strict=True)
-    )
-    return state[0].relative_to(frame[0]), (linear, angular)
 
 
 def ground_plane() -> ModelDescription:

@@ -14,10 +14,11 @@ def future(sim, ticks=150):
     for _ in range(ticks):
         with sim.lock:
             sim.advance(1)
-        models = sim.world.models.values()
+        models = sorted(sim.world.models.values(), key=lambda model: model.name)
         states = [(m.joint_states(), [m.link_state(link) for link in m.link_names]) for m in models]
         contacts = [each[:5] for each in sim.world.contacts()]
-        efforts = [j.effort for r in sim.robots for j in r.hardware.joints.values()]
+        robots = sorted(sim.robots, key=lambda robot: robot.model.name)
+        efforts = [j.effort for r in robots for j in r.hardware.joints.values()]
         seen.append((sim.now, states, contacts, efforts))
     return seen
 

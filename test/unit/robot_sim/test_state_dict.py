@@ -110,8 +110,12 @@ def test_parts_stay_the_same_objects_and_what_is_shared_is_left():
 
 
 @pytest.mark.parametrize(
-    "hold", [lambda each: each, lambda *each: [*each], lambda *each: deque(each), lambda a: {"a": a}]
-)
+    "hold",
+    [
+        lambda each: each, lambda *each: [*each], lambda *each: deque(each), lambda a: {"a": a},
+        lambda each: Pair(1, each), Mutable,
+    ],
+)  # fmt: skip
 def test_a_part_that_is_no_longer_there_is_named_and_never_becomes_plain_data(hold):
     inner = Part(x=1)
     outer = Part(held=hold(inner))
@@ -158,6 +162,15 @@ def test_containers_keep_their_order_limits_defaults_and_fields():
     assert part.pair == Pair([1], 2) and vars(part.mutable) == {"items": [1]}
     assert part.counts == {"a": 1} and part.counts["new"] == 0
     assert part.slotted.size == part.slotted.hidden() == 3 and not hasattr(part.slotted, "unset")
+
+
+def test_records_keep_their_objects_generators_and_defaults():
+    part = Part(pair=Pair(np.random.default_rng(1), defaultdict(list)), mutable=Mutable(random.Random(1)))
+    state = state_of(part)
+    drawn = part.pair.first.random(), part.mutable.items.random()
+    load([(part, state)])
+    assert (part.pair.first.random(), part.mutable.items.random()) == drawn
+    assert part.pair.second["new"] == []
 
 
 GENERATORS = [np.random.default_rng(1), np.random.Generator(np.random.Philox(1)), random.Random(1)]

@@ -2,7 +2,7 @@
 
 import contextlib
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
@@ -20,6 +20,7 @@ from robot_envs.variation import Variation
 from robot_envs.world_state import Commands, InitialState, StateQuery, WorldState
 from robot_sim.constants import NANOSECONDS
 from robot_sim.physics.pose import Pose
+from robot_sim.plain_data import differences
 from robot_sim.snapshot import Snapshot
 from ros_calls import master
 
@@ -56,22 +57,11 @@ def replay(journal: Sequence[Action], world: LockstepWorld, last: WorldState | N
         answer = action(world)
         if isinstance(answer, WorldState):
             state, steps = answer, steps + 1
-    # repr shows all bits of a number, and tells -0.0 from 0.0.
-    if state is not None and last is not None and repr(state) != repr(last):
+    if state is not None and last is not None and (found := next(differences(state, last), None)):
         raise SimulatorFault(
             f"the same reset and {steps} steps lead to another state, as where a plugin draws random "
-            f"numbers: {_difference(state, last)}"
+            f"numbers: {found}"
         )
-
-
-def _difference(state: WorldState, last: WorldState) -> str:
-    """Returns the first entry of a state that differs from the last one."""
-    pairs = zip(state._fields, state, last, strict=True)
-    part, one, other = next(each for each in pairs if repr(each[1]) != repr(each[2]))
-    if isinstance(one, Mapping) and isinstance(other, Mapping) and list(one) == list(other):
-        name = next(name for name in one if repr(one[name]) != repr(other[name]))
-        return f"{part} '{name}': {one[name]}, not {other[name]}"
-    return f"{part}: {one}, not {other}"
 
 
 def checked(state: WorldState, expected: int) -> WorldState:

@@ -26,11 +26,11 @@ MOST_WASTE = 1_000_000  # [bytes] of files that removed bodies were loaded from:
 
 
 class Fastening(NamedTuple):
-    """Two links that are fixed to each other: PyBullet's constraint, what it was made of, and the bodies and
-    links that don't meet meanwhile."""
+    """Two links that are fixed to each other: PyBullet's constraint, where the second one's centre of mass is
+    kept, seen from the first one's, and the bodies and links that don't meet meanwhile."""
 
     constraint: int
-    made_of: Sequence[Any]
+    place: Pose
     apart: Sequence[tuple[int, int, int, int]]
 
 
@@ -173,24 +173,16 @@ class BulletEngine(Engine):
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return [_contact(each, self._sides) for each in points if each[9] > 0.0]
 
-    def fastened(self) -> dict[int, Any]:
-        places = {body: place for place, body in enumerate(self._bodies)}
-        fastened: dict[int, Any] = {}
-        for number, each in self._fastened.items():
-            one, link, other, *rest = each.made_of
-            pairs = [pair[2:] for pair in each.apart]
-            fastened[number] = (places[one], link, places[other], *rest), pairs
-        return fastened
+    def fastened(self) -> dict[int, Pose]:
+        return {number: each.place for number, each in self._fastened.items()}
 
-    def refasten(self, fastened: Mapping[int, Any]) -> None:
+    def refasten(self, welds: Mapping[int, tuple[LinkOf, LinkOf, Pose]]) -> None:
         # The solver's result depends on the order of constraints.
         for number in list(self._fastened):
             self.unfasten(number)
-        ids = list(self._bodies)
-        for number, ((one, link, other, *rest), apart) in fastened.items():
-            pair = ids[one], ids[other]
-            self._fix(number, (pair[0], link, pair[1], *rest), [(*pair, *links) for links in apart])
-        self._last = max(self._last, *fastened, 0)
+        for number, weld in welds.items():
+            self._fix(number, *weld)
+        self._last = max(self._last, *welds, 0)
 
     def forget_contacts(self) -> None:
         self._separation.placed = True
@@ -203,16 +195,17 @@ class BulletEngine(Engine):
         assert isinstance(other, BulletBody)
         centre = other.centre_of_mass(its).relative_to(other.link_state(its)[0])
         wanted = one.link_state(link)[0].compose(pose).compose(centre)
-        place = wanted.relative_to(one.centre_of_mass(link))
-        pairs = [(a, b) for a in one.pieces(link) for b in other.pieces(its)]
-        made_of = weld_of((one.id, pairs[0][0]), (other.id, pairs[0][1]), place)
-        number = self._last = self._last + 1
-        self._fix(number, made_of, [(one.id, other.id, a, b) for a, b in pairs])
-        return number
+        self._last += 1
+        self._fix(self._last, first, second, wanted.relative_to(one.centre_of_mass(link)))
+        return self._last
 
-    def _fix(self, number: int, made_of: Sequence[Any], apart: Sequence[tuple[int, int, int, int]]) -> None:
-        constraint = add_weld(self._client, made_of)
-        self._fastened[number] = Fastening(constraint, made_of, apart)
+    def _fix(self, number: int, first: LinkOf, second: LinkOf, place: Pose) -> None:
+        (one, link), (other, its) = first, second
+        assert isinstance(one, BulletBody)
+        assert isinstance(other, BulletBody)
+        apart = [(one.id, other.id, a, b) for a in one.pieces(link) for b in other.pieces(its)]
+        ends = (one.id, apart[0][2]), (other.id, apart[0][3])
+        self._fastened[number] = Fastening(add_weld(self._client, weld_of(*ends, place)), place, apart)
         self._let_meet(number, False)
 
     def unfasten(self, number: int) -> None:

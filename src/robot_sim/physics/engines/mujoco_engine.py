@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
-from typing import Any
 
 import mujoco
 
@@ -92,21 +91,13 @@ class MujocoEngine(Engine):
     def order(self) -> list[MujocoBody]:
         return list(self._bodies.values())
 
-    def fastened(self) -> dict[int, Any]:
-        places = {id(body): place for place, body in enumerate(self._bodies.values())}
-        return {
-            number: ((places[id(one)], link), (places[id(other)], its), pose)
-            for number, ((one, link), (other, its), pose) in self._fastened.items()
-        }
+    def fastened(self) -> dict[int, Pose]:
+        return {number: pose for number, (*_, pose) in self._fastened.items()}
 
-    def refasten(self, fastened: Mapping[int, Any]) -> None:
-        if fastened != self.fastened():
-            bodies = self.order()
-            self._fastened = {
-                number: ((bodies[one], link), (bodies[other], its), pose)
-                for number, ((one, link), (other, its), pose) in fastened.items()
-            }
-            self._keys = count(max([next(self._keys), *fastened]) + 1)
+    def refasten(self, welds: Mapping[int, Joined]) -> None:
+        if welds != self._fastened:
+            self._fastened = dict(welds)
+            self._keys = count(max([next(self._keys), *welds]) + 1)
             self._compile()
 
     def close(self) -> None:

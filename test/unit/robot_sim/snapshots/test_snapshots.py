@@ -1,8 +1,11 @@
 """Snapshots of a world: the same commands lead to the same bits, or the snapshot is refused."""
 
+import copy
+import math
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from support.robots.branches import check_branches, future
 from support.robots.cartpole import CONTROLLERS, cartpole_urdf
@@ -16,9 +19,10 @@ from robot_sim.physics.pose import Pose, from_rpy
 from robot_sim.physics.properties import JointProperties, set_joint_properties
 from robot_sim.physics.world import World
 from robot_sim.simulator import Simulator
-from robot_sim.snapshot import SnapshotError
+from robot_sim.snapshot import Snapshot, SnapshotError
 
 S = 1_000_000_000  # [ns]
+PUSH = ((0.5, 0.0, 0.0), (0.0, 0.0, 0.01))  # [N], [N m]
 OFF_CENTRE = Pose((0.01, 0.0, 0.0))
 
 
@@ -93,6 +97,73 @@ def test_what_is_attached_comes_back_and_what_was_not_goes(sim):
     assert not sim.world.attachments
 
 
+def held_cube(sim):
+    robot = sim.world.spawn("gripper", parse_urdf(gripper()), Pose((0.0, 0.0, 0.3)))
+    box = sim.world.spawn("cube", parse_urdf(cube()), Pose((0.15, 0.0, 0.6)))
+    sim.world.attach((robot, "lift_link"), (box, "cube_link"))
+    sim.applied.wrenches.append(AppliedWrench(box, "cube_link", PUSH, ActingTime(0, -1)))
+    sim.applied.efforts.append(AppliedEffort(robot, "lift", 20.0, ActingTime(0, S)))
+    future(sim, 20)
+
+
+def test_planes_may_go_and_come_back_as_they_were_where_nothing_acts_on_them(sim):
+    held_cube(sim)
+    (plane,) = [model for model in sim.world.models.values() if model.description.is_plane]
+
+    def respawn(description=plane.description):
+        sim.delete_model(sim.world.models[plane.name])
+        return sim.world.spawn(plane.name, description, plane.initial_pose)
+
+    check_branches(sim, respawn)
+    snapshot = sim.save_state()
+    fresh = respawn()
+    sim.applied.wrenches.append(AppliedWrench(fresh, plane.link_names[0], PUSH, ActingTime(0, -1)))
+    pushed = sim.save_state()
+    sim.delete_model(sim.world.models[plane.name])
+    before = future(sim, 3)[-1]
+    with pytest.raises(SnapshotError, match=f"acts on the link '{plane.name}::.*isn't here"):
+        sim.restore_state(pushed)
+    assert sim.now == before[0]
+    sim.restore_state(snapshot)
+    link = plane.description.links[plane.link_names[0]]
+    icy = replace(link, collisions=[replace(shape, mu=0.01) for shape in link.collisions])
+    sim.world.spawn(plane.name, replace(plane.description, links={link.name: icy}), plane.initial_pose)
+    with pytest.raises(SnapshotError, match=f"'{plane.name}' has another description"):
+        sim.restore_state(snapshot)
+
+
+FORGED = {
+    "a gear": ("fastened", lambda was: dict.fromkeys(was, (3, 0, 0, -1, 6))),
+    "no length": ("fastened", lambda was: {n: Pose((0.0,) * 3, (0.0,) * 4) for n in was}),
+    "nowhere": ("fastened", lambda was: {n: Pose((np.float32("nan"), 0.0, 0.0)) for n in was}),
+    "loose": ("fastened", lambda was: {}),
+    "of no link": ("attachments", lambda was: [((each[0][0], "x"), *each[1:]) for each in was]),
+    "of no model": ("attachments", lambda was: [(("x", "x"), *each[1:]) for each in was]),
+    "on no link": ("wrenches", lambda was: [(each[0], "x", *each[2:]) for each in was]),
+    "empty": ("wrenches", lambda was: [(*each[:2], (), each[3]) for each in was]),
+    "no number": ("wrenches", lambda was: [(*each[:2], ((math.nan,) * 3,) * 2, each[3]) for each in was]),
+    "endless": ("wrenches", lambda was: [(*each[:2], ((2**62,) * 3,) * 2, each[3]) for each in was]),
+    "a text": ("efforts", lambda was: [(*each[:2], "x", each[3]) for each in was]),
+}
+
+
+@pytest.mark.parametrize(("part", "forge"), FORGED.values(), ids=FORGED)
+def test_forged_forces_and_attachments_leave_the_world_as_it_was(sim, part, forge):
+    held_cube(sim)
+    good = sim.save_state()
+    first = future(sim, 30)
+    content = copy.deepcopy(good.state)
+    place = content["world" if part in content["world"] else "applied"]
+    place[part] = forge(place[part])
+    sim.restore_state(good)
+    future(sim, 10)
+    with pytest.raises(SnapshotError):
+        sim.restore_state(Snapshot(good.fits, content, is_foreign=True))
+    assert future(sim, 20) == first[10:]
+    sim.restore_state(good)
+    assert future(sim, 30) == first
+
+
 def chain_of_cubes(sim):
     ends = []
     for k in range(5):
@@ -165,8 +236,7 @@ def test_motors_efforts_and_wrenches_that_act_for_a_time(sim):
     robot.set_motor("lift", 0.1, 50.0)
     box = sim.world.spawn("cube", parse_urdf(cube()), Pose((1.0, 0.0, 0.1)))
     sim.applied.efforts.append(AppliedEffort(robot, "lift", 20.0, ActingTime(0, S // 20)))
-    push = ((0.5, 0.0, 0.0), (0.0, 0.0, 0.01))
-    sim.applied.wrenches.append(AppliedWrench(box, "cube_link", push, ActingTime(0, S // 10)))
+    sim.applied.wrenches.append(AppliedWrench(box, "cube_link", PUSH, ActingTime(0, S // 10)))
     future(sim, 20)
 
     def between():

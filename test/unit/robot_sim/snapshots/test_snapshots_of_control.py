@@ -1,6 +1,7 @@
 """Snapshots of controllers, their goals and sensors."""
 
 import random
+from dataclasses import replace
 
 import pytest
 from support.robots.branches import check_branches, future
@@ -12,9 +13,11 @@ from robot_sim.control.controllers.base import Output
 from robot_sim.control.controllers.forward import Forward
 from robot_sim.control.hardware import EFFORT
 from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, TrajectoryPoint
+from robot_sim.physics.pose import Pose
 from robot_sim.sensors.schedule import Schedule
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders
+from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import StateError
 
 S = 1_000_000_000  # [ns]
@@ -35,6 +38,29 @@ def test_a_controlled_robot_goes_on_as_before(sim):
     assert first[-1][3] != first[0][3]
 
 
+def test_robots_may_have_come_in_another_order_with_idle_controllers_and_other_gains(sim):
+    def come(name, place):
+        robot = add_robot(sim, name, cartpole_urdf(), Pose((0.0, place, 0.0)))
+        start(robot, CONTROLLERS)
+        return robot
+
+    for name, place in (("first", 0.0), ("second", 1.0)):
+        come(name, place).manager.get("cart").command(0.1 + place)
+    future(sim, 37)
+
+    def between():
+        gone = next(each for each in sim.robots if each.model.name == "first")
+        sim.remove_robot(gone)
+        sim.delete_model(gone.model)
+        robot = come("first", 0.0)
+        robot.manager.load("idle", {**CONTROLLERS["cart"], "joint": "cart_pole"})
+        (pid,) = robot.manager.get("cart").pids.values()
+        pid.gains = replace(pid.gains, i=0.0, d=0.0)
+        robot.review_gains()
+
+    check_branches(sim, between)
+
+
 @pytest.fixture
 def arm(sim):
     robot = add_robot(sim, "cartpole", cartpole_urdf())
@@ -52,7 +78,7 @@ def test_a_trajectory_is_followed_from_where_it_was(sim, arm):
     arm.follow(way(0.1, -0.2, 0.2))
     future(sim, 150)
     first = check_branches(sim, lambda: arm.follow(way(-0.3)) or future(sim, 50), ticks=300)
-    assert max(abs(states[1][0][0][0]) for _, states, *_ in first) > 0.1
+    assert max(abs(states[0][0][0][0]) for _, states, *_ in first) > 0.1
 
 
 def test_goals_are_their_clients_who_are_told_that_they_end(sim, arm):
@@ -68,6 +94,9 @@ def test_goals_are_their_clients_who_are_told_that_they_end(sim, arm):
     assert [each.kind for each in first.outcomes] == ["succeeded"]
     second = pursue("second", -0.1)
     future(sim, 20)
+    with pytest.raises(SnapshotError):
+        sim.restore_state(Snapshot(snapshot.fits, {**snapshot.state, "now": None}, is_foreign=True))
+    assert not second.outcomes
     sim.restore_state(snapshot)
     assert [each.kind for each in second.outcomes] == ["canceled"]
     assert future(sim, 400) == after
