@@ -38,13 +38,13 @@ def own_file(package: str, place: str) -> Path:
 
 
 def resources() -> Resources:
-    """Finds the meshes and models that a file names by package://."""
+    """Finds the meshes and models that a file names by package://; looks through all packages only once."""
+    packages = _rospack()
 
     def package(name: str) -> str:
-        path = _rospkg_path(name)
-        if path is None:
-            raise LookupError(name)
-        return str(path)
+        if path := _rospkg_path(name, packages):
+            return str(path)
+        raise LookupError(name)
 
     return Resources(package=package)
 
@@ -137,13 +137,12 @@ def _parameters(data: bytes, name: str) -> dict[str, Any]:
     return content
 
 
-def _rospkg_path(package: str) -> Path | None:
-    """Returns a package's folder as rospkg finds it, or None without rospkg or the package."""
-    if not importlib.util.find_spec("rospkg"):
-        return None
-    import rospkg
+def _rospack() -> Any:
+    """Returns rospkg's look-up, which looks through all packages when first asked, or None without rospkg."""
+    return importlib.import_module("rospkg").RosPack() if importlib.util.find_spec("rospkg") else None
 
-    try:
-        return Path(rospkg.RosPack().get_path(package))
-    except rospkg.ResourceNotFound:
-        return None
+
+def _rospkg_path(package: str, packages: Any = None) -> Path | None:
+    """Returns a package's folder as rospkg finds it, or None without rospkg or the package."""
+    packages = packages or _rospack()
+    return None if packages is None or package not in packages.list() else Path(packages.get_path(package))

@@ -262,21 +262,22 @@ def _refused(reason: str) -> rospy.ServiceException:
 
 
 def resources() -> Resources:
-    """Returns the look-up of this process's environment; packages are found as rospack finds them."""
-    return Resources(_model_folders(), tuple(_environment_paths()), _package)
+    """Returns the look-up of this process's environment; packages are found as rospack finds them, once."""
+    packages = rospkg.RosPack()
+
+    def package(name: str) -> str:
+        try:
+            return str(packages.get_path(name))
+        except rospkg.ResourceNotFound as error:
+            raise LookupError(name) from error
+
+    return Resources(_model_folders(), tuple(_environment_paths()), package)
 
 
 @functools.cache
 def _model_folders() -> tuple[Path, ...]:
     """Reads them once, as Gazebo does: reading all packages takes long in a large workspace."""
     return tuple(Path(path) for path in [*model_paths(), os.path.expanduser(HOME_MODELS)])
-
-
-def _package(name: str) -> str:
-    try:
-        return str(rospkg.RosPack().get_path(name))
-    except rospkg.ResourceNotFound as error:
-        raise LookupError(name) from error
 
 
 def _environment_paths() -> list[Path]:

@@ -30,7 +30,7 @@ class WorkbenchGoals(PlaceCase):
     def test_hindsight_learns_the_same_and_its_policy_acts_in_process(self):
         ros, here = self.place.folder / "ros", self.place.folder / "bullet"
         params = ["her=true", "learning_starts=100", "net_arch=[16]", "batch_size=16", "train_freq=2",
-                  "eval_frequency=130", "eval_episodes=2"]  # fmt: skip
+                  "buffer_size=1000", "eval_frequency=130", "eval_episodes=2"]  # fmt: skip
 
         def train(run, backend):
             return ["train", "--algo", "sac", "--env-id", ARM, "--env-kwargs", f"backend={backend}",

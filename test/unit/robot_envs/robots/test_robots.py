@@ -28,7 +28,7 @@ def test_registering_them_loads_neither_their_files_nor_a_physics_engine() -> No
 class TestEach:
     @pytest.mark.slow
     def test_it_keeps_what_environments_promise(self, identifier: str) -> None:
-        check_robot_env(identifier, steps=40 if "Navigate" in identifier else 120)
+        check_robot_env(identifier, steps=20 if "Images" in identifier else 40 if "Nav" in identifier else 70)
 
     def test_its_description_is_sound_and_names_all_that_its_task_asks_for(self, identifier: str) -> None:
         made = gymnasium.registry[identifier].kwargs
