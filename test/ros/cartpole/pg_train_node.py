@@ -31,7 +31,7 @@ class PgTrain(PlaceCase):
         run = self.place.run
         output = self.run_here(
             "roslaunch", "cartpole", "pg_train.launch", "episodes:=5", "seed:=2", "save_every:=4",
-            "gui:=true", f"run_dir:={run}", "params:=gamma=0.98",
+            "gui:=true", f"run_dir:={run}", "params:=gamma=0.98 eval_episodes=1",
         )  # fmt: skip
         self.assert_nothing_left(output)
         self.assertIn("the window is the page http://127.0.0.1:", output)
@@ -78,7 +78,8 @@ class PgTrain(PlaceCase):
         before = set(place.processes())
         deleted = self.run_here("rosservice", "call", "/gazebo/delete_model", "cartpole")
         self.assertIn("True", deleted)
-        output = self.ends(place.train("--episodes=2", "--gui"))  # it has no window: one is opened
+        # It has no window: one is opened.
+        output = self.ends(place.train("--episodes=2", "--eval-episodes=1", "--gui"))
         self.assertNotIn("starting the simulator", output)
         self.assertIn("opening the simulator's window", output)
         self.assertIn("the window is the page http://127.0.0.1:", output)

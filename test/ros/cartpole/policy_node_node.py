@@ -45,11 +45,11 @@ class PolicyNode(unittest.TestCase):
         rospy.init_node("policy_on_robot")
         cls.place = Place(os.environ["ROS_MASTER_URI"])
         cls.addClassCleanup(cls.place.close)
+        READY.wait(BOUND)
+        assert ros_gazebo.gazebo_set_max_update_rate(SLOWLY)  # it runs while we train
         training_runs.run(training_runs.options_of("reinforce", TRAINING), cls.place.run)
         cls.exported = cls.place.folder / "policy.pt"
         assert cli.main(["export", str(cls.place.run), "--out", str(cls.exported)]) == 0
-        READY.wait(BOUND)
-        assert ros_gazebo.gazebo_set_max_update_rate(SLOWLY)
 
     def setUp(self):
         self.news = threading.Condition()

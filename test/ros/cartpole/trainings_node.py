@@ -16,7 +16,7 @@ class DqnTrain(PlaceCase):
     def test_roslaunch_passes_parameters(self):
         self.run_here(
             "roslaunch", "cartpole", "dqn_train.launch", "total_timesteps:=300", "eval_frequency:=0",
-            f"run_dir:={self.place.run}", "seed:=7", "params:=gamma=0.9 n_step=2",
+            f"run_dir:={self.place.run}", "seed:=7", "params:=gamma=0.9 n_step=2 confirm_episodes=1",
         )  # fmt: skip
         config = json.loads((self.place.run / "config.json").read_text())
         self.assertEqual((config["run"]["seed"], config["run"]["total_timesteps"]), (7, 300))

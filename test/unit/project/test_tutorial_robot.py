@@ -12,7 +12,6 @@ import importlib
 import os
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -28,6 +27,8 @@ from robot_envs.backends.ros.bringup import ready
 from robot_envs.scene import Scene
 from ros_calls import master
 from ros_calls.waiting import wait_until
+from ros_utils.ros_gazebo import gazebo_set_max_update_rate
+from ros_utils.simulation import reserved_port
 
 ROOT = Path(__file__).resolve().parents[3]
 ARM, VEHICLE, TESTS = (ROOT / "docs" / f"{name}.md" for name in ("tutorial_robot", "mobile", "testing"))
@@ -45,11 +46,9 @@ SHORTER = {
 @pytest.fixture(scope="module")
 def environment() -> dict[str, str]:
     """A user's, with a master of its own."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        master = f"http://127.0.0.1:{free.getsockname()[1]}"
     plain = {name: os.environ[name] for name in ("HOME", "CARTPOLE_WS_DIR") if name in os.environ}
-    return {**plain, "PATH": "/usr/local/bin:/usr/bin:/bin", "ROS_MASTER_URI": master,
-            "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}  # fmt: skip
+    return {**plain, "ROS_MASTER_URI": f"http://127.0.0.1:{reserved_port()}", "PYTHONUNBUFFERED": "1",
+            "PATH": "/usr/local/bin:/usr/bin:/bin", "OMP_NUM_THREADS": "1"}  # fmt: skip
 
 
 class Reader:
@@ -148,6 +147,7 @@ class Reader:
                 robot = importlib.import_module(f"{self.package}.robot").ROBOT
                 assert wait_until(master.is_up, LIMIT, "the master")
                 ready(Scene([robot])).wait(LIMIT)
+                assert gazebo_set_max_update_rate(0.3)  # of real time: whoever comes next takes a while
 
     def move(self, words: list[str]) -> None:
         """Has the policy move the simulated robot, and ends it with Ctrl-C."""

@@ -98,7 +98,7 @@ def test_packages_and_modules_are_found(ws, root, workspace, how):
     if how == "--with":
         done = ws("--with", str(workspace), *command)
     elif how == "nested":
-        done = ws("--with", "src", root / "ws", "--with", ".", root / "ws", *command, cwd=workspace)
+        done = ws("--with", "src/my_arm", root / "ws", "--with", ".", root / "ws", *command, cwd=workspace)
     else:
         done = ws(*command, **{how: str(workspace)})
     assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr

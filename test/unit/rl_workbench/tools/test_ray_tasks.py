@@ -17,11 +17,10 @@ from rl_workbench import cli
 pytestmark = [pytest.mark.extras("ray"), pytest.mark.slow, pytest.mark.xdist_group("ray")]
 
 # Long enough to be killed in the middle, on any machine; a checkpoint every few milliseconds.
-PARAMS = ["total_timesteps=3000", "learning_starts=50", "batch_size=8", "hidden_sizes=8",
+LONG = "total_timesteps=3000"
+PARAMS = ["learning_starts=50", "batch_size=8", "hidden_sizes=8",
           "eval_frequency=1000", "eval_episodes=1", "confirm_episodes=1",
           "checkpoint_frequency=100"]  # fmt: skip
-
-
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_AUTH_MODE": "disabled"}
 PATIENCE = 600.0  # [s], on a busy machine
 
@@ -33,9 +32,9 @@ def wait_until(condition: Callable[[], object], what: str) -> None:
         time.sleep(0.05)
 
 
-def benchmark(out: Path, *flags: str) -> subprocess.Popen[str]:
+def benchmark(out: Path, *flags: str, length: str = LONG) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "rl_workbench", "benchmark", f"--out={out}", "--seeds=2",
-               "--episodes=2", *flags, "--params", *PARAMS]  # fmt: skip
+               "--episodes=2", *flags, "--params", length, *PARAMS]  # fmt: skip
     return subprocess.Popen(
         command,
         env={**os.environ, **QUIET},
@@ -169,6 +168,6 @@ def test_where_no_cluster_is(tmp_path: Path, capsys, address: str, words: str) -
 
 
 def test_a_cluster_of_this_machine_alone(tmp_path: Path) -> None:
-    said = finished(benchmark(tmp_path, "--ray=local", "--seeds=1"))
+    said = finished(benchmark(tmp_path, "--ray=local", "--seeds=1", length="total_timesteps=300"))
     assert "1 node of a Ray cluster" in said
     assert (tmp_path / "results.md").is_file()
