@@ -102,6 +102,7 @@ def main() -> int:
     parser.add_argument("--episodes", type=int, default=40)
     parser.add_argument("--out", type=Path, default=Path("runs/benchmark"), help="folder for JSON and PNG")
     chosen = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # processes of a run end with it
     results: dict[str, list[list[float]]] = {}
     for way, (before, arguments) in WAYS.items():
         for is_busy in (False, True):

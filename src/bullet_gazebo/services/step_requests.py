@@ -177,7 +177,7 @@ def _by_name(entries: Iterable[tuple[str, str, Found]]) -> dict[str, list[Found]
 def _only(known: dict[str, list[Found]], name: str, missing: str, several: str, advice: str = "") -> Found:
     entries = known.get(name, [])
     if not entries:
-        raise ControlError(f"{missing}{did_you_mean(name, known)}{advice}")
+        raise ControlError(f"{missing}{did_you_mean(name, known) or advice}")
     if len(entries) > 1:
         raise ControlError(several)
     return entries[0]
