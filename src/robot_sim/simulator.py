@@ -327,7 +327,8 @@ class Simulator(Shared):
         self.now, self.resets = state["now"], state["resets"]
         self.applied.load_state_dict(state["applied"], self.world.models)
         parts, faults = state["parts"], []
-        there = [(part, parts[name]) for name, part in self.parts.items() if name in parts]
+        # One after the other: "steps" may put other "readers" in the place of the present ones.
+        there = ((self.parts[name], own) for name, own in parts.items() if name in self.parts)
         robots = zip(self._by_name, state["robots"], strict=True)
         for loads in (*(partial(robot.load_state_dict, own) for robot, own in robots), partial(load, there)):
             try:

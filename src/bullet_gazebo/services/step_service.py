@@ -30,12 +30,10 @@ from bullet_gazebo.services import NO_LINK, ServiceRefused, existing, offer
 from bullet_gazebo.services.step_requests import MAX_TICKS, SLICE, Addresses, Commanded, StepPlan, query_of
 from robot_sim.control.errors import ControlError
 from robot_sim.physics.properties import PropertyError, set_link_friction
-from robot_sim.plain_data import misfit
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, find_sensor
 from robot_sim.simulator import Simulator
 from robot_sim.state import NOTHING, StateReader, UnknownName
-from robot_sim.state_dict import StateError
 
 MOST_HANDLES = 256  # a client whose handle was dropped prepares its step again
 COUNTED = 24  # [bits] of a handle that count; those above are the simulator's
@@ -178,27 +176,16 @@ class StepService:
 
     def state_dict(self) -> dict[str, Any]:
         """Returns what a snapshot needs beside the simulator's state; the caller holds the lock."""
-        readers = self._readers
-        return {
-            "knows_contacts": self._knows_contacts,
-            "sensors": readers.names if readers else (),
-            "readers": readers.state_dict() if readers else None,
-        }
+        names = self._readers.names if self._readers else ()
+        return {"knows_contacts": self._knows_contacts, "sensors": names}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Takes back what `state_dict` has returned, after the simulator's state; models are the same."""
         self._knows_contacts = state["knows_contacts"]
-        if "readers" not in state:  # an environment's: the simulator has restored the readers
-            return
-        if state["readers"] is None:
+        if state.get("sensors"):
+            self._sense(state["sensors"])
+        elif "sensors" in state:  # an environment's has none: its readers are those that are here
             self._end_readers()
-            return
-        self._sense(state["sensors"])
-        assert self._readers is not None
-        own, given = self._readers.state_dict(), state["readers"]
-        if own.keys() != given.keys() or misfit(own, given):
-            raise StateError(f"the readers of sensors have {given!s:.200}")
-        self._readers.load_state_dict(given)
 
     def _end_readers(self) -> None:
         if self._readers:

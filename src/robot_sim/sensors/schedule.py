@@ -43,7 +43,7 @@ class SensorClock(Stateful):
     measure: Measure
     listens: Callable[[], bool]
     at_once: bool
-    last: int | None = None  # time of the last measurement [ns], if nothing was moved since
+    last: int = LONG_AGO  # time of the last measurement [ns], if nothing was moved since
     heard: bool = False
     has_newcomer: bool = False
 
@@ -148,7 +148,7 @@ class Schedule(Shared, Stateful):
                 clock.plan(now)
             # Who was sent the last one may be gone, unnoticed: what there is now is measured anew.
             moved_at = self.last_move(clock.model).at
-            is_old = clock.last in (None, now, moved_at) or now - clock.last >= max(clock.period, 1)
+            is_old = clock.last in (now, moved_at) or now - clock.last >= max(clock.period, 1)
             if clock.heard and came and clock.at_once and is_old:
                 fresh.append(clock)
         self._take_part()
@@ -211,8 +211,8 @@ class Schedule(Shared, Stateful):
             self._moves_of = {**kept, **dict.fromkeys([each.name for each in moved], move)}
         concerned = [each for each in self._clocks if moved is None or each.model in moved]
         for clock in concerned:
-            if anew or now < clock.begin or (clock.last is not None and now < clock.last):
+            if anew or now < clock.begin or now < clock.last:
                 clock.begin = now
-            clock.last = None
+            clock.last = LONG_AGO
             clock.plan(now)
         self._take([clock for clock in concerned if clock.heard])

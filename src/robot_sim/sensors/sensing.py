@@ -172,6 +172,16 @@ class Measurement(Stateful):
     interface: ClassVar[str] = ""  # of ros_control by which controllers have it
     fields: ClassVar[Mapping[str, Field]] = {}
     rate: float = 0.0  # of measurements [Hz of simulated time]; 0 is every step
+    # The description's.
+    non_persistent: ClassVar[tuple[str, ...]] = (
+        "deviation",
+        "rate",
+        "_deviation",
+        "_high",
+        "_link",
+        "_low",
+        "_offset",
+    )
 
     def __init__(self, mount: Mount) -> None:
         self.mount = mount

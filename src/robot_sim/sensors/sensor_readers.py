@@ -17,11 +17,12 @@ from robot_sim.control.errors import ControlError
 from robot_sim.control.hardware import RobotHardware, SensorHandle
 from robot_sim.physics.description import DescriptionError, Plugin, Sensor, library_of
 from robot_sim.physics.model import Model
+from robot_sim.plain_data import misfit
 from robot_sim.sensors.schedule import SensorClock
 from robot_sim.sensors.sensing import Measurement, Mount, Sensing
 from robot_sim.simulator import Simulator
 from robot_sim.state import SCOPE, UnknownName
-from robot_sim.state_dict import Stateful
+from robot_sim.state_dict import StateError, Stateful, attributes_of, put_attributes
 
 WITHOUT = Plugin("", "", Element("plugin"))
 
@@ -100,6 +101,16 @@ class SensorReaders(Stateful):
     def read(self) -> list[Taken]:
         """Returns the last measurement of each, in the order of the names."""
         return [self._taken[name] for name in self.names]
+
+    def load_state_dict(self, state: Any) -> None:
+        """Takes back what `state_dict` has returned; raises StateError if it is of other sensors."""
+        own, clocks = attributes_of(self), "_clocks"
+        fault = misfit(own, state, "readers") or misfit(own[clocks], state[clocks], clocks, exactly=True)
+        if fault or own.keys() != state.keys():
+            raise StateError(fault or f"the readers of sensors have {[*state]!s:.200}")
+        if not all(name in self.names and type(each.now) is int for name, each in state["_taken"].items()):
+            raise StateError("measurements are of other sensors")
+        put_attributes(self, state)
 
     def end(self) -> None:
         """Ends the measurements."""

@@ -110,7 +110,7 @@ class SnapshotsTest(LockstepCase):
         self.assertIn("models", answer.status_message)
 
     def test_sensors_of_prepared_steps_measure_at_the_same_times(self):
-        """Also those that another client's steps have ended since, and none that have begun since."""
+        """Also those that another client's steps have ended or replaced, and none that have begun since."""
         self.spawn("bot", BOT.read_text(), kind="sdf", y=3.0)
         steps, names = PreparedSteps(), StepNames(sensors=("scanner",))
         self.addCleanup(steps.close)
@@ -128,11 +128,15 @@ class SnapshotsTest(LockstepCase):
                 step(5)
             save("measuring")
             first = measured()
-            for ends in (False, True):
-                if ends:
-                    step(5)
-                restore("measuring")
-                self.assertEqual(measured(), first)
+            data = gazebo("save_state", read="measuring").data
+            for others in (None, (), ("inertia",), ("inertia", "scanner")):
+                if others is not None:
+                    steps.begin(StepNames(sensors=others), 5, [])
+                    steps.end()
+                for how in ({"name": "measuring"}, {"data": data}):
+                    answer = gazebo("restore_state", **how)
+                    self.assertTrue(answer.success, answer.status_message)
+                    self.assertEqual(measured(), first)
 
     def test_states_are_bounded_and_can_be_forgotten(self):
         names = [f"state_{number}" for number in range(MOST)]

@@ -1,5 +1,6 @@
 """Snapshots of controllers, their goals and sensors."""
 
+import copy
 import random
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ from robot_sim.control.trajectory_goals import GoalRequest, Trajectory, Trajecto
 from robot_sim.physics.pose import Pose
 from robot_sim.sensors.schedule import Schedule
 from robot_sim.sensors.sensing import Sensing
-from robot_sim.sensors.sensor_readers import SensorReaders
+from robot_sim.sensors.sensor_readers import SensorReaders, Taken
 from robot_sim.snapshot import Snapshot, SnapshotError
 from robot_sim.state_dict import StateError
 
@@ -189,6 +190,49 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
         measured()
         sim.restore_state(snapshot)
         assert measured() == first
+
+
+FORGED = {
+    "clocks": lambda state: state["_clocks"][0].state.clear(),
+    "a time": lambda state: state["_taken"].update(feel=Taken(1.5, {})),
+    "of others": lambda state: state["_taken"].update(other=Taken(1, {})),
+    "no text": lambda state: state.update(_sensors="x"),
+    "more": lambda state: state.update(names=["x"]),
+}
+
+
+@pytest.mark.parametrize("forge", FORGED.values(), ids=FORGED)
+def test_forged_states_of_sensors_leave_the_world_as_it_was(sim, forge):
+    add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
+    readers = SensorReaders(sim, Sensing(sim, seed=3), ["feel"])
+    future(sim, 25)
+    good = sim.save_state()
+    first = future(sim, 30), readers.read()[0].now
+    content = copy.deepcopy(good.state)
+    forge(content["parts"]["readers"])
+    with pytest.raises(SnapshotError):
+        sim.restore_state(Snapshot(good.fits, content, is_foreign=True))
+    assert readers.read()[0].now == first[1]
+    sim.restore_state(good)
+    assert (future(sim, 30), readers.read()[0].now) == first
+
+
+def test_what_a_sensor_is_made_of_is_no_state_of_its_own(sim):
+    add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
+    readers = SensorReaders(sim, Sensing(sim, seed=3), ["feel"])
+    (sensor,) = readers.state_dict()["_sensors"]
+    assert not {"deviation", "rate", "_link", "_offset"} & set(sensor.state)
+
+
+def test_a_file_fits_where_somebody_hears_a_sensor_since(sim):
+    schedule, heard = Schedule(sim), False
+    sim.parts["clock"] = schedule.begin(next(iter(sim.world.models.values())), 10.0, id, lambda: heard)
+    snapshot = Snapshot.from_bytes(sim.save_state().to_bytes())
+    heard = True
+    schedule.review()
+    future(sim, 300)
+    sim.restore_state(snapshot)
+    assert sim.now == 0
 
 
 def test_a_sensor_that_is_heard_only_since_measures_at_its_times(sim):
