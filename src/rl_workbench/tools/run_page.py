@@ -34,17 +34,10 @@ MAX_SEED = 2**31 - 1
 
 
 def show_run(
-    folder: Path,
-    policies: tuple[str, ...],
-    seed: int,
-    env_options: dict[str, Any],
-    *,
-    interrupt: Interrupt,
-    host: str = LOOPBACK,
-    port: int | None = None,
-    browser: bool = True,
+    folder: Path, policies: tuple[str, ...], seed: int, env_options: dict[str, Any], *,
+    interrupt: Interrupt, host: str = LOOPBACK, port: int | None = None, browser: bool = True,
     beside_training: bool = False,
-) -> None:
+) -> None:  # fmt: skip
     """Serves the page until Ctrl-C, or until the training that started it ends.
 
     It plays the episode of a seed again and again, at first by the first of the policies, with options of the

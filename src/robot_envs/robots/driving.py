@@ -76,16 +76,9 @@ class DriveToGoal(Task):
     max_steps = 150
 
     def __init__(
-        self,
-        robot: Robot,
-        laser: str | None,
-        ranges: int = 24,
-        world: Source | None = None,
-        touch: float = 0.25,
-        clearance: float = 0.45,
-        nearest: float = 1.5,
-        furthest: float = 4.0,
-    ) -> None:
+        self, robot: Robot, laser: str | None, ranges: int = 24, world: Source | None = None,
+        touch: float = 0.25, clearance: float = 0.45, nearest: float = 1.5, furthest: float = 4.0,
+    ) -> None:  # fmt: skip
         if laser and not (isinstance(ranges, int) and ranges > 0):
             raise TaskError(f"ranges is a whole number from 1, not {ranges}")
         if not (math.inf > furthest > nearest >= 0.0 and math.inf > min(touch, clearance) >= 0.0):
