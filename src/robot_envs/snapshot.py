@@ -119,15 +119,20 @@ def diff(first: EnvSnapshot, second: EnvSnapshot) -> list[Difference]:
     return [*differences(one.fits, other.fits), *differences(one.state, other.state)]
 
 
-def whole_of(state: WorldSnapshot, controllers: Mapping[str, Any]) -> tuple[Snapshot, int, dict[str, Any]]:
+def whole_of(
+    state: WorldSnapshot, controllers: Mapping[str, Any], sensors: Sequence[str]
+) -> tuple[Snapshot, int, dict[str, Any]]:
     """Returns a snapshot, when its episode has begun [ns], and what the controllers hold there.
 
-    Raises RestoreRefused if it can't be had, or is of no episode.
+    Raises RestoreRefused if it can't be had, is of no episode, or of one that reads other sensors.
     """
     try:
         whole = state.whole()
     except SimulatorError as error:
         raise RestoreRefused(str(error)) from error
+    read = whole.state["parts"].get("readers", {"names": ()})["names"]
+    if read != tuple(sensors):
+        raise RestoreRefused(f"its episode reads the sensors {read!s:.200}, and this one {sensors!s:.200}")
     episode = whole.state.get("episode")
     if isinstance(episode, dict):
         begun, held = episode.get("begun"), episode.get("held")

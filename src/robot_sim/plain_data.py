@@ -278,6 +278,9 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
         keys, others = (each if isinstance(each, dict) else range(len(each)) for each in (there, given))
         if set(keys) != set(others):
             return f"{place} has {list(others)!s:.200}, not {list(keys)!s:.200}"
+    own, other = (each.state if isinstance(each, Held) else None for each in (there, given))
+    if isinstance(own, dict) and isinstance(other, dict) and not own.keys() <= other.keys():
+        return f"{place} lacks some of {[*own]!s:.200}"
     entries = there.items() if isinstance(there, dict) else ()
     lost = any(key not in given and _refers(each) for key, each in entries)
     if isinstance(there, (list, tuple)) and len(there) != len(given):

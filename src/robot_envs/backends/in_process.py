@@ -255,7 +255,8 @@ class InProcessWorld(RobotBackend):
         return snapshot
 
     def restore_state(self, state: WorldSnapshot) -> str:
-        (snapshot, begun, held), fault = whole_of(state, self.scene.ports), ""
+        names = self._readers.names if self._readers else ()
+        (snapshot, begun, held), fault = whole_of(state, self.scene.ports, names), ""
         try:
             self._sim.restore_state(snapshot)
         except SnapshotError as error:

@@ -56,7 +56,7 @@ class SensorReaders(Stateful):
     Raises UnknownName if a name refers to none, or several, or to one that can't be read.
     """
 
-    non_persistent = ("names", "_schedule", "_parts", "_mounts")
+    non_persistent = ("_schedule", "_parts", "_mounts")
 
     def __init__(self, sim: Simulator, sensing: Sensing, names: Sequence[str]) -> None:
         self.names = tuple(names)
@@ -106,10 +106,10 @@ class SensorReaders(Stateful):
         """Takes back what `state_dict` has returned; raises StateError if it is of other sensors."""
         own, clocks = attributes_of(self), "_clocks"
         fault = misfit(own, state, "readers") or misfit(own[clocks], state[clocks], clocks, exactly=True)
-        if fault or own.keys() != state.keys():
-            raise StateError(fault or f"the readers of sensors have {[*state]!s:.200}")
-        if not all(name in self.names and type(each.now) is int for name, each in state["_taken"].items()):
-            raise StateError("measurements are of other sensors")
+        taken = state["_taken"].items()
+        fits = all(name in self.names and type(each.now) is int for name, each in taken)
+        if fault or not fits or own.keys() != state.keys() or own["names"] != state["names"]:
+            raise StateError(fault or "its measurements aren't those of these sensors")
         put_attributes(self, state)
 
     def end(self) -> None:

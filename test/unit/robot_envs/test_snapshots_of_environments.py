@@ -386,3 +386,18 @@ def test_an_episode_beyond_its_last_step_is_truncated(made, begun):
     longer, shorter = begun(Remembering, steps=8), made(Remembering, max_steps=5)
     shorter.restore_state(longer.save_state())
     assert shorter.step(0)[3]
+
+
+@pytest.mark.parametrize("identifier", ["robot_envs/NavigateImages-v0", "robot_envs/Navigate-v0"])
+def test_an_episode_never_begins_with_the_readings_of_other_sensors(identifier: str) -> None:
+    other = {"robot_envs/Navigate-v0", "robot_envs/NavigateImages-v0"} - {identifier}
+    giver, taker = (gymnasium.make(name).unwrapped for name in (*other, identifier))
+    giver.reset(seed=0)
+    taker.reset(seed=0)
+    before = taker.backend.poses(["base_footprint"])
+    for snapshot in (giver.save_state(), EnvSnapshot.from_bytes(giver.save_state().to_bytes())):
+        with pytest.raises(SimulatorError, match=r"reads the sensors .*'laser'"):
+            taker.reset(seed=1, options={"snapshot": snapshot})
+        assert taker.backend.poses(["base_footprint"]) == before
+    giver.close()
+    taker.close()

@@ -273,7 +273,7 @@ class LockstepWorld(RobotBackend):
             fault = self._restored(RestoreStateRequest(name=state.name, seed=seed))
             begun, held = state.begun, state.held
         else:
-            whole, begun, held = whole_of(state, self.scene.ports)
+            whole, begun, held = whole_of(state, self.scene.ports, self._query.sensors)
             with self._simulator:
                 self._world.claim(self)
             self._look(self._names)  # sensors that states have are read from now on

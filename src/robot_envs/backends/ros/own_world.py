@@ -185,7 +185,7 @@ class OwnWorld(RobotBackend):
 
     def restore_state(self, state: WorldSnapshot) -> str:
         if not isinstance(state, JournalledSnapshot) or state.of is not self:
-            whole, begun, _ = whole_of(state, self.scene.ports)
+            whole, begun, _ = whole_of(state, self.scene.ports, self._query.sensors)
             begin = partial(LockstepWorld.restore_state, state=whole)
             fault = self._perform(begin)
             self._journal, self._passed, self._last = [begin], whole.state["now"] - begun, None

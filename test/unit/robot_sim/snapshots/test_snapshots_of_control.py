@@ -194,10 +194,12 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
 
 FORGED = {
     "clocks": lambda state: state["_clocks"][0].state.clear(),
+    "no part": lambda state: state["_sensors"][0].state.pop("_imu"),
+    "names": lambda state: state.update(names=("felt",)),
     "a time": lambda state: state["_taken"].update(feel=Taken(1.5, {})),
     "of others": lambda state: state["_taken"].update(other=Taken(1, {})),
     "no text": lambda state: state.update(_sensors="x"),
-    "more": lambda state: state.update(names=["x"]),
+    "more": lambda state: state.update(more=1),
 }
 
 
