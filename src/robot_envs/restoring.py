@@ -1,6 +1,7 @@
 """Episodes of environments, saved and restored."""
 
 import contextlib
+from functools import cached_property
 from typing import Any
 
 import gymnasium
@@ -180,14 +181,14 @@ class SavedEnv(DrawnEnv):
         }  # fmt: skip
         return {name: part for name, part in parts.items() if part is not None}
 
-    @property
+    @cached_property
     def _fits(self) -> dict[str, Any]:
         """What another environment must share to restore its snapshots."""
-        kind = type(self.task)
+        kind, spaces = type(self.task), (self.observation_space, self.action_space)
         parts = (self._sensor, self._actuator, self._randomisation)
         fits = {
             "task": f"{module_of(kind)}.{kind.__qualname__}", "control period": self.control_period,
-            "imperfections": [type(part).__name__ for part in parts if part is not None],
+            "imperfections": [type(part).__name__ for part in parts if part], "spaces": str(spaces),
         }  # fmt: skip
         for part in (self._sensor, self._actuator):
             fits |= part.settings if part is not None else {}

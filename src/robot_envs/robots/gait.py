@@ -29,15 +29,9 @@ class Gait:
     """
 
     def __init__(
-        self,
-        model: ModelDescription,
-        joints: Sequence[str],
-        stance: np.ndarray,
-        feet: Sequence[str],
-        phases: Sequence[float],
-        period: float,
-        lift: float,
-    ) -> None:
+        self, model: ModelDescription, joints: Sequence[str], stance: np.ndarray, feet: Sequence[str],
+        phases: Sequence[float], period: float, lift: float,
+    ) -> None:  # fmt: skip
         self.phases, self.period, self.lift = np.array(phases), period, lift
 
         def places(at: np.ndarray) -> np.ndarray:

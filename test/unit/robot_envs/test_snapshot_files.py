@@ -377,3 +377,14 @@ def test_a_simulators_snapshot_and_another_version_are_named():
         Snapshot.from_bytes(Snapshot({"engine": np.zeros(2)}, {}).to_bytes())
     with pytest.raises(SnapshotError, match="of another version"):
         EnvSnapshot.from_bytes(b"robot snapshot 2\n" + bytes(50))
+
+
+def test_a_file_of_the_same_task_with_other_spaces_is_refused_and_the_episode_goes_on() -> None:
+    few, many = (gymnasium.make("robot_envs/Navigate-v0", ranges=number).unwrapped for number in (24, 36))
+    few.reset(seed=0)
+    many.reset(seed=0)
+    with pytest.raises(ValueError, match="its spaces is"):
+        many.restore_state(EnvSnapshot.from_bytes(few.save_state().to_bytes()))
+    many.step(many.action_space.sample())
+    few.close()
+    many.close()
