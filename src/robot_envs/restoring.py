@@ -188,7 +188,8 @@ class SavedEnv(DrawnEnv):
         parts = (self._sensor, self._actuator, self._randomisation)
         fits = {
             "task": f"{module_of(kind)}.{kind.__qualname__}", "control period": self.control_period,
-            "imperfections": [type(part).__name__ for part in parts if part], "spaces": str(spaces),
+            "imperfections": [type(part).__name__ for part in parts if part is not None],
+            "spaces": str(spaces),
         }  # fmt: skip
         for part in (self._sensor, self._actuator):
             fits |= part.settings if part is not None else {}

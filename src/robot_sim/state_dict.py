@@ -183,7 +183,7 @@ def attributes_of(part: Any) -> dict[str, Any]:
 def put_attributes(part: Any, state: Mapping[str, Any], taken: Taken | None = None) -> None:
     """Gives an object what `attributes_of` has returned; what has come since goes. `taken`: see `Taken`."""
     kind: Any = type(part)
-    slots, left, _ = _layout(kind)
+    slots, left, supplied = _layout(kind)
     own = getattr(part, "__dict__", {})
     held = {**own, **{name: getattr(part, name, None) for name in slots}} if slots else own
     if (changed := _CHANGED.get()) is not None:
@@ -191,6 +191,9 @@ def put_attributes(part: Any, state: Mapping[str, Any], taken: Taken | None = No
     faults = []
     for name, saved in state.items():
         value = saved
+        if changed is not None and (name in left or (supplied and isinstance(held.get(name), Shared))):
+            faults.append(f"{kind.__qualname__}.{name} is no state")  # forged: it is never saved
+            continue
         if type(saved) in ATOMS:
             if name in own:  # most are
                 own[name] = saved

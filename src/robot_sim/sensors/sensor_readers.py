@@ -106,8 +106,7 @@ class SensorReaders(Stateful):
         """Takes back what `state_dict` has returned; raises StateError if it is of other sensors."""
         own, clocks = attributes_of(self), "_clocks"
         fault = misfit(own, state, "readers") or misfit(own[clocks], state[clocks], clocks, exactly=True)
-        taken = state["_taken"].items()
-        fits = all(name in self.names and type(each.now) is int for name, each in taken)
+        fits = all(name in self.names and type(now) is int for name, (now, _) in state["_taken"].items())
         if fault or not fits or own.keys() != state.keys() or own["names"] != state["names"]:
             raise StateError(fault or "its measurements aren't those of these sensors")
         put_attributes(self, state)

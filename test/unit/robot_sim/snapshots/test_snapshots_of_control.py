@@ -194,6 +194,8 @@ def test_sensors_measure_the_same_with_the_same_noise(sim):
 
 FORGED = {
     "clocks": lambda state: state["_clocks"][0].state.clear(),
+    "a part of the file's": lambda state: state["_sensors"][0].state.update(deviation=-1.0),
+    "no mount": lambda state: state["_sensors"][0].state.update(mount=5),
     "no part": lambda state: state["_sensors"][0].state.pop("_imu"),
     "names": lambda state: state.update(names=("felt",)),
     "a time": lambda state: state["_taken"].update(feel=Taken(1.5, {})),
@@ -217,13 +219,6 @@ def test_forged_states_of_sensors_leave_the_world_as_it_was(sim, forge):
     assert readers.read()[0].now == first[1]
     sim.restore_state(good)
     assert (future(sim, 30), readers.read()[0].now) == first
-
-
-def test_what_a_sensor_is_made_of_is_no_state_of_its_own(sim):
-    add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
-    readers = SensorReaders(sim, Sensing(sim, seed=3), ["feel"])
-    (sensor,) = readers.state_dict()["_sensors"]
-    assert not {"deviation", "rate", "_link", "_offset"} & set(sensor.state)
 
 
 def test_a_file_fits_where_somebody_hears_a_sensor_since(sim):
