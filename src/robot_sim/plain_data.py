@@ -15,7 +15,16 @@ from typing import Any, NamedTuple
 import msgpack
 import numpy as np
 
-from robot_sim.state_dict import ATOMS, NUMBERS_AND_TEXTS, Held, StateError, fields_of, module_of, plain_key
+from robot_sim.state_dict import (
+    ATOMS,
+    NUMBERS_AND_TEXTS,
+    Held,
+    StateError,
+    fields_of,
+    module_of,
+    plain_key,
+    record_of,
+)
 
 DEEPEST = 100
 MOST = 2**22  # entries of lists and dictionaries, those of records and arrays included
@@ -239,12 +248,7 @@ def _record(module: Any, name: Any, fields: Any) -> Any:
         if hasattr(kind, "__dataclass_fields__"):
             names = fields_of(kind)
         if names and isinstance(fields, list) and len(fields) == len(names):
-            if issubclass(kind, tuple):
-                return tuple.__new__(kind, fields)
-            made = object.__new__(kind)
-            for each, value in zip(names, fields, strict=True):
-                object.__setattr__(made, each, value)
-            return made
+            return record_of(kind, fields)
         raise StateError(f"it has a wrong record of {module}.{name}"[:300])
     return Record(module, name, fields)
 

@@ -13,7 +13,6 @@ that its class, or one that it is derived from, names as `non_persistent` are le
 """
 
 import contextlib
-import copy
 import dataclasses
 import sys
 from collections import defaultdict, deque
@@ -269,21 +268,21 @@ def _saved(value: Any) -> Any:
     if hasattr(kind, "state_dict") and hasattr(kind, "load_state_dict"):
         return Held(kind.__qualname__, state_of(value))
     if isinstance(value, tuple) and hasattr(kind, "_fields"):
-        return tuple.__new__(kind, map(_saved, value))
+        return record_of(kind, map(_saved, value))
     if hasattr(kind, "__dataclass_fields__"):
         names = fields_of(kind)
         held = {name: getattr(value, name) for name in names if hasattr(value, name)}
-        if len(held) < len(names) or not held.keys() >= getattr(value, "__dict__", {}).keys():
+        besides = not held.keys() >= getattr(value, "__dict__", {}).keys()
+        if len(held) < len(names) or besides or isinstance(value, (list, dict, set)):
             raise _Unknown(f"a {kind.__module__}.{kind.__qualname__} whose attributes aren't its fields")
         if kind.__dataclass_params__.frozen and ATOMS.issuperset(map(type, held.values())):
             return value
-        made = copy.copy(value)
         for name, each in held.items():
             try:
-                object.__setattr__(made, name, _saved(each))
+                held[name] = _saved(each)
             except _Unknown as error:
                 raise _Unknown(f"{error} in {kind.__qualname__}.{name}") from None
-        return made
+        return record_of(kind, held.values())
     of = f" of {value.dtype}" if kind is np.ndarray else ""
     raise _Unknown(f"a {kind.__module__}.{kind.__qualname__}{of}")
 
@@ -302,6 +301,16 @@ def is_supplied(kind: Any) -> bool:
 def fields_of(kind: Any) -> tuple[str, ...]:
     """Returns the names of a data class's fields."""
     return tuple([each.name for each in dataclasses.fields(kind)])
+
+
+def record_of(kind: Any, values: Iterable[Any]) -> Any:
+    """Returns a named tuple or data class of its fields' values; no code of the class runs."""
+    if issubclass(kind, tuple):
+        return tuple.__new__(kind, values)
+    made = object.__new__(kind)
+    for name, value in zip(fields_of(kind), values, strict=True):
+        object.__setattr__(made, name, value)
+    return made
 
 
 def plain_key(key: Any) -> Any:
@@ -363,12 +372,7 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
     if not names:
         return _saved(saved)
     values = [_loaded(getattr(current, name, None), getattr(saved, name), taken) for name in names]
-    if issubclass(kind, tuple):
-        return tuple.__new__(kind, values)
-    made = copy.copy(saved)
-    for name, value in zip(names, values, strict=True):
-        object.__setattr__(made, name, value)
-    return made
+    return record_of(kind, values)
 
 
 def _loaded_generator(current: Any, saved: Mapping[str, Any], taken: Taken | None) -> Any:

@@ -214,20 +214,11 @@ class StepClient:
         return _response(answer)
 
     def reset(
-        self,
-        positions: Mapping[str, float] | None = None,
-        velocities: Mapping[str, float] | None = None,
-        *,
-        seed: int = 0,
-        everything: bool = False,
-        ticks: int = 0,
-        commands: Commands | None = None,
-        models: Mapping[str, Pose] | None = None,
-        twists: Mapping[str, Twist] | None = None,
-        model_states: Some = False,
-        links: Sequence[str] | Mapping[str, str] = (),
-        contacts: Some = False,
-    ) -> StepWorldResponse:
+        self, positions: Mapping[str, float] | None = None, velocities: Mapping[str, float] | None = None,
+        *, seed: int = 0, everything: bool = False, ticks: int = 0, commands: Commands | None = None,
+        models: Mapping[str, Pose] | None = None, twists: Mapping[str, Twist] | None = None,
+        model_states: Some = False, links: Sequence[str] | Mapping[str, str] = (), contacts: Some = False,
+    ) -> StepWorldResponse:  # fmt: skip
         """Resets the world, begins an episode from a defined state, and returns that state.
 
         Args:

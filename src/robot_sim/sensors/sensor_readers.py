@@ -25,6 +25,7 @@ from robot_sim.state import SCOPE, UnknownName
 from robot_sim.state_dict import StateError, Stateful, attributes_of, put_attributes
 
 WITHOUT = Plugin("", "", Element("plugin"))
+MOST_SIZED = 8  # cameras read in sizes of the reader's: a picture of full HD takes a second
 
 
 @cache
@@ -53,13 +54,15 @@ class SensorReaders(Stateful):
     """Sensors that measure by their own clocks, with or without subscribers.
 
     The caller holds the simulator's lock. Names are plain or model::sensor; of a model's IMU, the plugin's.
-    Raises UnknownName if a name refers to none, or several, or to one that can't be read.
+    Raises UnknownName if a name refers to none, or several, or can't be read, or names are too many.
     """
 
     non_persistent = ("_schedule", "_parts", "_mounts")
 
     def __init__(self, sim: Simulator, sensing: Sensing, names: Sequence[str]) -> None:
         self.names = tuple(names)
+        if len({*names}) < len(names) or sum("@" in name for name in names) > MOST_SIZED:
+            raise UnknownName(f"a sensor is read twice, or more than {MOST_SIZED} cameras in another size")
         self._schedule = sensing.schedule
         self._taken: dict[str, Taken] = {}
         made = [(name, *find_sensor(sim, sensing, name)) for name in self.names]

@@ -37,18 +37,10 @@ class RobotWorld(SteppedWorld):
         self._prismatic: set[str] = set()  # joints
 
     def spawn(
-        self,
-        file: str,
-        controllers: str | None = None,
-        run: Sequence[str] = (),
-        *,
-        name: str = "robot",
-        ns: str = "/",
-        xyz: Vector = (0.0, 0.0, 0.0),
-        rpy: Vector = (0.0, 0.0, 0.0),
-        joints: Mapping[str, float] | None = None,
-        arguments: Sequence[str] = (),
-    ) -> None:
+        self, file: str, controllers: str | None = None, run: Sequence[str] = (), *, name: str = "robot",
+        ns: str = "/", xyz: Vector = (0.0, 0.0, 0.0), rpy: Vector = (0.0, 0.0, 0.0),
+        joints: Mapping[str, float] | None = None, arguments: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         """Spawns a robot or an object, and starts controllers.
 
         Args:

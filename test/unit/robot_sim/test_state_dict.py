@@ -47,6 +47,11 @@ class Mutable:
 
 
 @dataclass
+class Listed(list):
+    size: int
+
+
+@dataclass
 class Unset:
     later: int = field(init=False)
 
@@ -310,6 +315,7 @@ def test_attributes_that_are_not_persistent_stay_also_those_of_a_base():
     [
         ((each for each in "abc"), "builtins.generator"),
         (io.StringIO(), "_io.StringIO"),
+        (Listed(2), "Listed whose attributes aren't its fields"),
         (Unset(), "Unset whose attributes aren't its fields"),
         (Initialised(2), "Initialised whose attributes aren't its fields"),
         (lambda: 0, "builtins.function"),

@@ -19,6 +19,7 @@ from robot_sim.sensors.schedule import Schedule
 from robot_sim.sensors.sensing import Sensing
 from robot_sim.sensors.sensor_readers import SensorReaders, Taken
 from robot_sim.snapshot import Snapshot, SnapshotError
+from robot_sim.state import UnknownName
 from robot_sim.state_dict import StateError
 
 S = 1_000_000_000  # [ns]
@@ -219,6 +220,13 @@ def test_forged_states_of_sensors_leave_the_world_as_it_was(sim, forge):
     assert readers.read()[0].now == first[1]
     sim.restore_state(good)
     assert (future(sim, 30), readers.read()[0].now) == first
+
+
+@pytest.mark.parametrize("names", [["feel", "feel"], [f"feel@{size}x9" for size in range(9)]])
+def test_readers_of_more_pictures_than_anybody_needs_are_refused(sim, names):
+    add_robot(sim, "cartpole", cartpole_urdf().replace("</robot>", IMU))
+    with pytest.raises(UnknownName, match="read twice, or more than 8 cameras"):
+        SensorReaders(sim, Sensing(sim), names)
 
 
 def test_a_file_fits_where_somebody_hears_a_sensor_since(sim):
