@@ -31,7 +31,6 @@ NUMBERS_AND_TEXTS = "biufcSU"  # kinds of arrays
 SOURCES = f"{Path(__file__).parents[1]}/"  # of this library and those on top of it
 ATOMS = frozenset((type(None), bool, int, float, str, bytes))
 
-
 # Objects that loads within `undoable` have changed, with the attributes that they had.
 _CHANGED: ContextVar[list[tuple[Any, dict[str, Any]]] | None] = ContextVar("_CHANGED", default=None)
 Taken = dict[int, tuple[Any, Any]]
@@ -363,8 +362,6 @@ def _loaded(current: Any, saved: Any, taken: Taken | None) -> Any:
         if type(current) is defaultdict:
             return defaultdict(current.default_factory, entries)
         return entries
-    if kind is np.ndarray:
-        return _saved(saved)
     if kind is deque:
         there = [*current] if isinstance(current, deque) else ()
         return deque(_loaded(there, [*saved], taken), saved.maxlen)

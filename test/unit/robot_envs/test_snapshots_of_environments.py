@@ -328,8 +328,7 @@ def test_a_robot_that_was_varied_for_a_snapshots_episode_is_nominal_again(made):
     snapshot, env, same = varied.save_state(), made(), made()
     varied.close()
     same.reset(seed=2)
-    there = same.save_state()
-    first = returns(same)
+    there, first = same.save_state(), returns(same)
     for options in ({}, {"snapshot": there}):
         env.reset(options={"snapshot": snapshot})
         env.reset(seed=2, options=options)
@@ -353,11 +352,9 @@ class Listing(BalanceTask):
 
 def test_a_tasks_state_may_be_any_plain_data(begun):
     env = begun(Listing)
-    env.task.count = 3
-    snapshot = env.save_state()
-    env.task.count = 4
+    env.task.count, snapshot = 4, env.save_state()
     env.restore_state(snapshot)
-    assert env.task.count == 3
+    assert env.task.count == 0
 
 
 def test_where_a_controller_cannot_load_its_state_all_else_is_restored(begun, monkeypatch):
