@@ -42,6 +42,7 @@ class Task(Stateful, ABC):
     | `reward_query` | further ones that only `reward`, `is_terminal` and `info` see |
     | `objects` | what is spawned besides the robots |
     | `world` | a world file in place of the first robot's; None: that one |
+    | `action_names` | of an action's numbers, for who drives them by hand; by default 1, 2, … |
     | `aims_at_velocity` | whether `aim` takes a velocity (ahead, to the left, about), as `cmd_vel` has it |
 
     Names of joints in states and of controllers in commands are plain in a world with one robot; see
@@ -50,12 +51,13 @@ class Task(Stateful, ABC):
     store data between calls, if `initial_state`, which begins an episode, resets it.
     """
 
-    non_persistent: ClassVar[tuple[str, ...]] = ("query", "reward_query", "objects", "world")
+    non_persistent: ClassVar[tuple[str, ...]] = ("query", "reward_query", "objects", "world", "action_names")
     max_steps: int | None = None
     query: StateQuery = StateQuery()
     reward_query: StateQuery = StateQuery()
     objects: Sequence[Object] = ()
     world: Source | None = None
+    action_names: Sequence[str] = ()
     aims_at_velocity: ClassVar[bool] = False
 
     @abstractmethod

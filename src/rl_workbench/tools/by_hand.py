@@ -46,13 +46,16 @@ class HeldKeys:
         WorkbenchError: If the space has more numbers, or choices, than there are keys.
     """
 
-    def __init__(self, gui: viser.GuiApi, space: spaces.Space[Any]) -> None:
+    def __init__(self, gui: viser.GuiApi, env: Env) -> None:
+        space = env.action_space
         pairs = [*PAIRS]
         if isinstance(space, spaces.Discrete):
             pairs[:2] = pairs[1::-1]  # of two choices, mostly left and right
             names = [f"choice {int(space.start) + number}" for number in range(int(space.n))]
         elif isinstance(space, spaces.Box):
-            names = [f"{sign}{number + 1}" for number in range(space.low.size) for sign in "+-"]
+            size, given = space.low.size, getattr(getattr(env.unwrapped, "task", None), "action_names", ())
+            numbers = given if len(given) == size else range(1, size + 1)
+            names = [f"{sign}{number}" for number in numbers for sign in "+-"]
         else:
             raise WorkbenchError(f"actions of {space} can't be driven by hand: --policy plays them")
         self._space, self._until = space, dict.fromkeys("".join(pairs), 0.0)
@@ -108,7 +111,7 @@ class Driver:
         self._server, self._recorder = server, recorder
         self._view, self._rate = make_view(server, env), step_rate(env)
         gui = server.gui
-        self._keys = HeldKeys(gui, env.action_space)
+        self._keys = HeldKeys(gui, env)
         self._speed = gui.add_slider("Speed", 0.1, 1.0, 0.1, 1.0, hint="of real time")
         self._clicks: queue.SimpleQueue[str] = queue.SimpleQueue()
         for word, hint in HINTS.items():

@@ -74,6 +74,7 @@ class DriveToGoal(Task):
 
     non_persistent = ("robot", "port", "floor")
     max_steps = 150
+    action_names = ("ahead", "turn")
 
     def __init__(
         self, robot: Robot, laser: str | None, ranges: int = 24, world: Source | None = None,

@@ -65,6 +65,7 @@ class Picking(Task):
     """What tasks of the gripper arm have in common: arm, cube and table, actions, and how episodes begin."""
 
     max_steps = 60
+    action_names = ("x", "y", "z", "grip")
     query = StateQuery(links=(LinkQuery("tip"),), models=("cube",))
     objects = OBJECTS
 

@@ -54,6 +54,7 @@ class ReachInSpace(Task):
     """
 
     max_steps = 50
+    action_names = JOINTS
     query = StateQuery(links=(LinkQuery("tip"),))
 
     def __init__(self) -> None:

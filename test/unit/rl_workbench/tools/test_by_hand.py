@@ -58,6 +58,7 @@ def steps(page: Browser) -> int:
 def test_held_keys_are_a_robots_action_and_undone_ones_were_never(tmp_path: Path) -> None:
     hand = Hand("robot_envs/PickCube-v0", max_steps=60)  # 3 s
     with hand as page:
+        page.wait_for_text("I +x, M -x, J +y, L -y, U +z, O -z, Y +grip, H -grip")
         page.key("keyDown", "i")
         wait_for(lambda: steps(page) > 5, "steps ahead")
         page.key("keyUp", "i")
