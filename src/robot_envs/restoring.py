@@ -1,6 +1,7 @@
 """Episodes of environments, saved and restored."""
 
 import contextlib
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -13,11 +14,21 @@ from robot_envs.snapshot import EnvSnapshot
 from robot_envs.variation import Randomisation, Variation
 from robot_envs.variation.imperfections import Actuator, Sensor
 from robot_envs.world_state import Joints, WorldState
+from robot_sim.fingerprint import digest
 from robot_sim.generators import KIND
 from robot_sim.physics.engine import STRONGEST
 from robot_sim.plain_data import is_within, misfit, resolve
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import StateError, is_supplied, load, module_of, state_of, undoable
+
+
+def _bounds(space: gymnasium.Space[Any]) -> str:
+    """Returns what tells spaces apart; their own texts depend on NumPy's print options."""
+    inner = getattr(space, "spaces", ())
+    named = inner.items() if isinstance(inner, Mapping) else enumerate(inner)
+    own = [getattr(space, name, None) for name in ("low", "high", "n", "start", "nvec")]
+    kept = str(space.dtype), own, [(key, _bounds(each)) for key, each in named]
+    return f"{type(space).__name__}{space.shape or ''} {digest(kept)}"
 
 
 class SavedEnv(DrawnEnv):
@@ -189,7 +200,7 @@ class SavedEnv(DrawnEnv):
         fits = {
             "task": f"{module_of(kind)}.{kind.__qualname__}", "control period": self.control_period,
             "imperfections": [type(part).__name__ for part in parts if part is not None],
-            "spaces": str(spaces),
+            "spaces": [*map(_bounds, spaces)],
         }  # fmt: skip
         for part in (self._sensor, self._actuator):
             fits |= part.settings if part is not None else {}

@@ -4,29 +4,31 @@ import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, fields, is_dataclass
-from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from robot_sim.applied_forces import ActingTime
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.joint import JointHandle
-from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape
+from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape, suns
 from robot_sim.physics.model import NO_STOP
-from robot_sim.physics.pose import ZERO, Pose
+from robot_sim.physics.pose import ZERO, Pose, rotate
 from robot_sim.physics.world import World
-from robot_sim.plain_data import LARGEST, entries_of, is_within, misfit
+from robot_sim.plain_data import LARGEST, differences, entries_of, is_within, misfit
 from robot_sim.robot import ControlledRobot
 from robot_sim.snapshot import SnapshotError
 from robot_sim.state_dict import Shared, Stateful, is_supplied
 
 # What has no effect on motion, or is compared by itself (`Model.properties`).
 LEFT_OUT: Mapping[type, frozenset[str]] = {
-    ModelDescription: frozenset(("warnings", "left_out", "stand_ins", "script", "initial_pose")),
+    ModelDescription: frozenset(("warnings", "left_out", "stand_ins", "initial_pose")),
     Link: frozenset(("inertia", "gravity")),
     Joint: frozenset(("kind", "lower", "upper", "damping")),
 }
+SETTINGS = ("options", "_settings", "_geometry")  # of supplied controllers
 OFF_LENGTH = 1e-3  # of a unit quaternion
 
 
@@ -37,8 +39,10 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
     without ROS has none where nothing reaches them.
     """
     planes = {name for name, model in world.models.items() if model.description.is_plane}
-    digests = {name: _digest((each.description, each.initial_pose)) for name, each in world.models.items()}
+    digests = {name: digest((each.description, each.initial_pose)) for name, each in world.models.items()}
+    lights = suns(world.lights.values())
     return {
+        "lights": digest([(each.diffuse, rotate(each.pose.orientation, each.direction)) for each in lights]),
         "engine": type(world.engine).__name__.removesuffix("Engine"),
         "models": {name: each for name, each in digests.items() if name not in planes},
         "planes": {name: each for name, each in digests.items() if name in planes},
@@ -50,6 +54,7 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
                     for each in robot.manager.running
                     if any(each.claims.values())
                 },
+                "limits": digest({name: each.limits for name, each in robot.hardware.joints.items()}),
             }
             for robot in robots
         ],
@@ -57,16 +62,17 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
 
 
 def _controller(controller: Controller) -> dict[str, Any]:
-    """Returns its class, joints and configured gains, which a snapshot doesn't bring back."""
+    """Returns its class, joints, settings and configured gains, which a snapshot doesn't bring back."""
     # A user's may change its lists; what they refer to is compared when they are loaded.
-    lists = [each for each in vars(controller).values() if isinstance(each, list)]
-    entries = [each for some in lists for each in some] if is_supplied(type(controller)) else []
+    own = vars(controller) if is_supplied(type(controller)) else {}
+    entries = [each for some in own.values() if isinstance(some, list) for each in some]
     handles = [getattr(each, "joint", each) for each in entries]
     return {
         "type": type(controller).__name__,
         "claims": dict(controller.claims),
         "joints": [each.name for each in handles if isinstance(each, JointHandle)],
         "gains": {name: astuple(pid.configured) for name, pid in controller.pids.items()},
+        "settings": digest([own.get(name) for name in SETTINGS]),
     }
 
 
@@ -88,12 +94,11 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     others += [name for name, digest in here["planes"].items() if planes.get(name, digest) != digest]
     if others:
         return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
+    if given.get("lights") != here["lights"]:
+        return "the world's lights aren't those of the snapshot"
     robots = given["robots"] if isinstance(given.get("robots"), list) else []
-    for one, other in zip_longest(robots, here["robots"]):
-        if one != other:
-            told = f"{one!r:.200} in it, and here {other!r:.200}"
-            return f"the controllers that run aren't those of the snapshot: {told}"
-    return ""
+    found = next(differences(robots, here["robots"]), "")
+    return found and f"the robots' controllers or limits aren't those of the snapshot: {found}"
 
 
 def check_foreign(
@@ -181,13 +186,18 @@ def _absent(value: Any, place: str = "") -> Iterator[str]:
         yield from _absent(each, f"{place}/{name}")
 
 
-def _digest(value: Any) -> str:
+def digest(value: Any) -> str:
+    """Returns what tells descriptions apart: data classes, containers, numbers and texts."""
     return hashlib.blake2b(repr(_plain(value)).encode(), digest_size=16).hexdigest()
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Mesh):
         return value.digest
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, (int, float, np.number)):
+        return float(value) + 0.0  # -0.0 is 0.0
     if isinstance(value, Element):
         text = (value.text or "").strip()
         return value.tag, sorted(value.attrib.items()), text, [_plain(each) for each in value]

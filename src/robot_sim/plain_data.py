@@ -35,7 +35,7 @@ TUPLE, ARRAY, SCALAR, RECORD, DEQUE, INTEGER = range(1, 7)  # codes of MessagePa
 # Attributes that may be None for a while.
 OPTIONAL = frozenset(
     ("_angles", "_before", "_clock", "_goal", "_kept", "_last", "_newest", "_seen", "_waited")
-    + ("gravity", "net", "steps", "value")
+    + ("gravity", "initial", "net", "steps", "value", "waited")
 )
 LARGEST = 2**63  # what counts nanoseconds stays below
 LONGEST_INTEGER = 256  # [bytes]; states of generators have 16 to 64
@@ -163,6 +163,8 @@ def _extension(value: Any) -> msgpack.ExtType:
         fields = [getattr(value, name) for name in fields_of(kind)]
     else:
         raise StateError(f"a {kind.__qualname__} isn't plain data")
+    if _class_of(module_of(kind), kind.__qualname__) is not kind:
+        raise StateError(f"a {kind.__module__}.{kind.__qualname__} couldn't be found again by this name")
     return msgpack.ExtType(RECORD, _pack([module_of(kind), kind.__qualname__, fields]))
 
 
@@ -228,13 +230,19 @@ def _dtype(name: Any) -> np.dtype[Any]:
     return np.dtype(name)
 
 
+def _class_of(module: str, name: str) -> Any:
+    """Returns what has that name, if its module was imported."""
+    found: Any = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, "__dict__", {}).get(part)
+    return found
+
+
 def _record(module: Any, name: Any, fields: Any) -> Any:
     """Makes a record; no code of its class runs."""
     if not (isinstance(module, str) and isinstance(name, str)):
         raise StateError("it has a record without a class")
-    kind: Any = sys.modules.get(module)
-    for part in name.split("."):
-        kind = getattr(kind, "__dict__", {}).get(part)
+    kind = _class_of(module, name)
     if isinstance(kind, type) and (module_of(kind), kind.__qualname__) == (module, name):
         if kind is Record:
             raise StateError("it has a record of records")
@@ -266,7 +274,7 @@ def misfit(there: Any, given: Any, place: str = "", *, exactly: bool = False) ->
     numbers = (int, float)
     if _is_odd(given) and (isinstance(there, int) or (exactly and not _is_odd(there))):
         return f"{place} is {given}"
-    if there is None or (given is None and place.rpartition("/")[2] in OPTIONAL):
+    if (there is None or given is None) and (there is given or place.rpartition("/")[2] in OPTIONAL):
         return ""
     if type(there) in numbers and type(given) in numbers:
         counts = isinstance(given, int) and abs(there) < LARGEST  # generators have larger numbers

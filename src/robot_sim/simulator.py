@@ -57,7 +57,7 @@ class Simulator(Shared):
         self.max_update_rate = max_update_rate
         self.relatch = relatch
         self.now = 0  # [ns] of simulated time
-        world.clock = lambda: self.sim_time
+        world.clock = lambda: (self.now - self.began) / NANOSECONDS
         self.elapsed = 0  # [ns] of simulated time in all; no reset sets it back
         self.robots: list[ControlledRobot] = []
         self._robots_of: dict[Model, list[ControlledRobot]] = {}
@@ -70,6 +70,7 @@ class Simulator(Shared):
         self.restored: list[Callable[[], None]] = []  # called under the lock after a restore
         self.before_advance: list[Callable[[], None]] = []  # called under the lock
         self.resets = 0  # of the world or the simulation
+        self.began = 0  # [ns]: when actors began
         self.reseeded: list[Callable[[int], None]] = []  # called under the lock with a new seed
         # Senders of messages after ticks, and whether callers that step the world run them.
         self.outboxes: list[Outbox] = []
@@ -258,7 +259,7 @@ class Simulator(Shared):
     def reset_time(self) -> None:
         """Sets the time to zero; models and controllers continue from where they are."""
         with self.lock:
-            self.now = 0
+            self.now = self.began = 0
             for robot in self.robots:
                 robot.joints_moved(self.now, relatch=False)
             self.moves.tell(None)
@@ -271,7 +272,7 @@ class Simulator(Shared):
         state = {
             "robots": [robot.state_dict() for robot in self._by_name],
             "parts": {name: state_of(part) for name, part in self.parts.items()},
-            "applied": self.applied.state_dict(), "now": self.now, "resets": self.resets,
+            "applied": self.applied.state_dict(), "now": self.now, "began": self.began, "resets": self.resets,
             "world": self.world.state_dict(),
         }  # fmt: skip
         return Snapshot(self.fits, state)
@@ -324,7 +325,7 @@ class Simulator(Shared):
 
     def _load(self, state: Mapping[str, Any]) -> None:
         self.world.load_state_dict(state["world"])
-        self.now, self.resets = state["now"], state["resets"]
+        self.now, self.began, self.resets = state["now"], state["began"], state["resets"]
         self.applied.load_state_dict(state["applied"], self.world.models)
         parts, faults = state["parts"], []
         # One after the other: "steps" may put other "readers" in the place of the present ones.
@@ -364,7 +365,7 @@ class Simulator(Shared):
     def reset(self, everything: bool) -> None:
         """Resets the world, or the simulation with `everything`; the caller holds the lock."""
         if everything:
-            self.now = 0
+            self.now = self.began = 0
         self.resets += 1
         self.world.reset(joints=everything)
         for robot in self.robots:

@@ -114,7 +114,8 @@ def load(parts: Iterable[tuple[Any, Any]]) -> None:
             elif takes is not None:
                 part.load_state_dict(_saved(state))  # a copy: it may keep what it gets
             elif is_generator(part):
-                _loaded_generator(part, state, taken)
+                if _loaded_generator(part, state, taken) is not part:
+                    raise StateError(f"a generator takes no state of the kind {state[KIND]}")
             elif not isinstance(part, Shared):
                 put_attributes(part, state, taken)
         except StateError as error:

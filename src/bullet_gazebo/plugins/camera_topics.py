@@ -60,17 +60,10 @@ class CameraTopics(Shared):
     """
 
     def __init__(
-        self,
-        context: PluginContext,
-        camera: PinholeCamera,
-        topics: SensorTopics,
-        scope: str,
-        names: tuple[str, str],
-        baseline: float,
-        own: str = "",
-        frame: str | None = None,
+        self, context: PluginContext, camera: PinholeCamera, topics: SensorTopics, scope: str,
+        names: tuple[str, str], baseline: float, own: str = "", frame: str | None = None,
         latch: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._context, self._camera = context, camera
         given = context.text("frameName", "") if frame is None else frame
         self._frame = frame_of(scope, given)

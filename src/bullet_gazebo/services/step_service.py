@@ -252,6 +252,7 @@ class StepService:
                 seed_random_numbers(request.seed)
                 sim.reseed(request.seed)
             sim.reset(everything=request.reset == srv.StepWorldRequest.SIMULATION)
+            sim.began = sim.now
         for model, pose, twist in plan.placed_models:
             sim.place_model(model, pose, twist)
         for model, (positions, velocities) in plan.placed_joints.items():

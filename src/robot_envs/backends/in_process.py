@@ -175,7 +175,8 @@ class InProcessWorld(RobotBackend):
             if seed:
                 self._sim.reseed(seed)
             self._sim.reset(everything=False)
-            self._begin, self._knows_contacts = self._sim.now, False
+            self._begin = self._sim.began = self._sim.now
+            self._knows_contacts = False
             for model, (pose, twist) in models:
                 upright = Pose(pose.position, normalized(pose.orientation))
                 self._sim.place_model(model, upright, twist)

@@ -36,15 +36,9 @@ class RobotPicture:
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        width: int = WIDTH,
-        height: int = HEIGHT,
-        *,
-        camera: CameraLike = None,
-        base: Callable[[], Pose] | None = None,
-        beside: Surroundings | None = None,
-    ) -> None:
+        self, robot: Robot, width: int = WIDTH, height: int = HEIGHT, *, camera: CameraLike = None,
+        base: Callable[[], Pose] | None = None, beside: Surroundings | None = None,
+    ) -> None:  # fmt: skip
         for side in (width, height):
             if not 1 <= side <= LARGEST_PICTURE or side != int(side):
                 raise ValueError(f"a picture's width and height lie in [1, {LARGEST_PICTURE}], not {side}")

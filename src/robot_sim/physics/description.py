@@ -3,7 +3,7 @@
 import math
 import os
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -254,6 +254,14 @@ class Light:
     pose: Pose = Pose()
     cast_shadows: bool = False
     kind: str = "point"  # or directional, spot
+
+
+SUN = Light("sun", (0.8, 0.8, 0.8, 1.0), direction=(-0.5, 0.1, -0.9), kind="directional")
+
+
+def suns(lights: Iterable[Light]) -> list[Light]:
+    """Returns the lights by which cameras see: Gazebo's sun if there is none."""
+    return [each for each in lights if each.kind == "directional"] or [SUN]
 
 
 class SavedMotion(NamedTuple):

@@ -68,14 +68,9 @@ class ShapeMaker:
         self._singles.add(where, np.array([*end, 0.0, 0.0, 0.0, 1.0]), label)
 
     def _add_part(
-        self,
-        where: Where,
-        solid: Geometry,
-        pose: Pose,
-        scale: tuple[float, float, float],
-        rgba: Color,
+        self, where: Where, solid: Geometry, pose: Pose, scale: tuple[float, float, float], rgba: Color,
         collision: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         opacity = min(max(rgba[3], 0.0), 1.0)
         look = Appearance(solid, math.prod(scale) < 0.0, opacity < 1.0, not collision)
         self._batches.add(look, Instance(where, pose, scale, color_bytes(rgba), opacity))
@@ -112,14 +107,9 @@ class ShapeMaker:
         self._add_part(where, _box(), pose, (BOX, BOX, BOX), UNSHOWN)
 
     def _add_rod(
-        self,
-        where: Where,
-        corner: Vector,
-        way: Vector,
-        ends: tuple[float, float],
-        radius: float,
+        self, where: Where, corner: Vector, way: Vector, ends: tuple[float, float], radius: float,
         color: tuple[int, int, int],
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Adds a thin cylinder along `way`, between two distances [m] from `corner`."""
         low, high = ends
         x, y, z = np.array(corner) + (low + high) / 2.0 * np.array(way)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_sim.physics.description import Color, DescriptionError, Light, Link, Shape
+from robot_sim.physics.description import Color, DescriptionError, Light, Link, Shape, suns
 from robot_sim.physics.model import Model
 from robot_sim.physics.pose import rotate
 from robot_sim.physics.world import World
@@ -16,7 +16,6 @@ from robot_sim.sensors.frames import frames
 FURTHEST = 1e9  # [m] that a sensor reaches
 BRIGHT = 0.8  # diffuse colour of Gazebo's sun
 GROUND: Color = (0.8, 0.8, 0.8, 1.0)  # of a plane without a colour
-SUN = Light("sun", (BRIGHT, BRIGHT, BRIGHT, 1.0), direction=(-0.5, 0.1, -0.9), kind="directional")
 
 logger = logging.getLogger(f"rosout.{__name__}")
 
@@ -105,9 +104,8 @@ class WorldScene:
             self._turns, self._places = self._turns.copy(), self._places.copy()
             moving = [model for model in models if not model.description.static]
             self._turns[self._moving], self._places[self._moving] = self._placed(moving, self._moving)
-        lights = self._world.lights.values()
-        beams = [beam_of(each) for each in lights if each.kind == "directional"]
-        return SceneState(self._version, self._targets, self._turns, self._places, beams or [beam_of(SUN)])
+        beams = [*map(beam_of, suns(self._world.lights.values()))]
+        return SceneState(self._version, self._targets, self._turns, self._places, beams)
 
     def _parts_of(self, model: Model) -> list[tuple[str, Target]]:
         links = model.description.links.values()

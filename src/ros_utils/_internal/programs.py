@@ -144,15 +144,9 @@ class Started(int):
 
 
 def start(
-    command: Sequence[str],
-    kind: str,
-    label: str,
-    *,
-    window: bool = False,
-    screen: bool = False,
-    log_file: str | None = None,
-    env: Mapping[str, str] | None = None,
-) -> Handle:
+    command: Sequence[str], kind: str, label: str, *, window: bool = False, screen: bool = False,
+    log_file: str | None = None, env: Mapping[str, str] | None = None,
+) -> Handle:  # fmt: skip
     """Starts a program in its own session; raises CannotStart if it or its log can't be opened.
 
     Args:

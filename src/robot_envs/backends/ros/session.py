@@ -42,15 +42,9 @@ class RosSession:
     """
 
     def __init__(
-        self,
-        robots: Robot | Sequence[Robot],
-        name: str,
-        argv: list[str],
-        realtime: bool,
-        gui: bool,
-        seed: int,
-        rviz: bool = False,
-    ) -> None:
+        self, robots: Robot | Sequence[Robot], name: str, argv: list[str], realtime: bool, gui: bool,
+        seed: int, rviz: bool = False,
+    ) -> None:  # fmt: skip
         self._scene = Scene([robots] if isinstance(robots, Robot) else robots)
         self._world = SharedWorld()
         self._name, self._argv = name, argv

@@ -30,15 +30,9 @@ class BulletBody(Body):
     implicit_damping = False
 
     def __init__(
-        self,
-        client: int,
-        body: int,
-        description: ModelDescription,
-        pose: Pose,
-        weightless: set[tuple[int, int]],
-        separation: Separation,
-        offsets: Mapping[str, Pose],
-    ) -> None:
+        self, client: int, body: int, description: ModelDescription, pose: Pose,
+        weightless: set[tuple[int, int]], separation: Separation, offsets: Mapping[str, Pose],
+    ) -> None:  # fmt: skip
         """
         Args:
             client, body: PyBullet's numbers of world and body.
