@@ -112,9 +112,7 @@ def check_foreign(
         SnapshotError: If something is of another type, or a tick would fail.
     """
     pairs = zip(robots, before["robots"], state["robots"], strict=True)
-    supplied = {name for name, part in parts.items() if is_supplied(type(part))} - {
-        "readers"
-    }  # which check theirs
+    supplied = {name for name, part in parts.items() if is_supplied(type(part)) and name != "readers"}
     own_parts = {name: each for name, each in before["parts"].items() if name in supplied}
     known = {**before, "robots": [_known(*each) for each in pairs], "parts": own_parts}
     if fault := misfit(known, state):
