@@ -13,6 +13,8 @@ import numpy as np
 from robot_sim.applied_forces import ActingTime
 from robot_sim.control.controllers.base import Controller
 from robot_sim.control.joint import JointHandle
+from robot_sim.control.pid import Pid
+from robot_sim.grippers import PidFollower
 from robot_sim.physics.description import Joint, Link, Mesh, ModelDescription, Shape, suns
 from robot_sim.physics.model import NO_STOP
 from robot_sim.physics.pose import ZERO, Pose, rotate
@@ -32,7 +34,9 @@ SETTINGS = ("options", "_settings", "_geometry")  # of supplied controllers
 OFF_LENGTH = 1e-3  # of a unit quaternion
 
 
-def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, Any]:
+def fingerprint(
+    world: World, robots: Sequence[ControlledRobot], followers: Mapping[str, PidFollower]
+) -> dict[str, Any]:
     """Returns what snapshots of a world fit, as plain data.
 
     Controllers that claim no joint, such as those that publish, may differ. Planes may be missing: a world
@@ -54,11 +58,17 @@ def fingerprint(world: World, robots: Sequence[ControlledRobot]) -> dict[str, An
                     for each in robot.manager.running
                     if any(each.claims.values())
                 },
+                "gains": _configured(robot.hardware.pids),
                 "limits": digest({name: each.limits for name, each in robot.hardware.joints.items()}),
             }
             for robot in robots
         ],
+        "followers": _configured({name: each.pid for name, each in followers.items()}),
     }
+
+
+def _configured(pids: Mapping[str, Pid]) -> dict[str, tuple[float, ...]]:
+    return {name: astuple(pid.configured) for name, pid in pids.items()}
 
 
 def _controller(controller: Controller) -> dict[str, Any]:
@@ -71,7 +81,7 @@ def _controller(controller: Controller) -> dict[str, Any]:
         "type": type(controller).__name__,
         "claims": dict(controller.claims),
         "joints": [each.name for each in handles if isinstance(each, JointHandle)],
-        "gains": {name: astuple(pid.configured) for name, pid in controller.pids.items()},
+        "gains": _configured(controller.pids),
         "settings": digest([own.get(name) for name in SETTINGS]),
     }
 
@@ -96,9 +106,10 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
         return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
     if given.get("lights") != here["lights"]:
         return "the world's lights aren't those of the snapshot"
-    robots = given["robots"] if isinstance(given.get("robots"), list) else []
-    found = next(differences(robots, here["robots"]), "")
-    return found and f"the robots' controllers or limits aren't those of the snapshot: {found}"
+    names = "robots", "followers"
+    one, other = ({name: fits.get(name) for name in names} for fits in (given, here))
+    found = next(differences(one, other), "")
+    return found and f"controllers, gains or limits aren't those of the snapshot: {found}"
 
 
 def check_foreign(

@@ -31,13 +31,13 @@ class PidFollower(Stateful):
     non_persistent = ("_mimic",)
 
     def __init__(self, model: Model, joint: str, pid: Pid) -> None:
-        self._model, self._joint, self._pid = model, joint, pid
+        self._model, self._joint, self.pid = model, joint, pid
         self._mimic = model.description.mimics[joint]
         model.release_follower(joint)
 
     def moved(self) -> None:
         """Forgets the past."""
-        self._pid.clear()
+        self.pid.clear()
 
     def update(self, now: int) -> None:
         """Applies the effort of the step that ends at `now` [ns]."""
@@ -45,7 +45,7 @@ class PidFollower(Stateful):
         target = mimic.multiplier * model.joint_state(mimic.driver)[0] + mimic.offset
         error = target - model.joint_state(self._joint)[0]
         if abs(error) >= mimic.sensitiveness:
-            effort = self._pid.compute(error, model.time_step)
+            effort = self.pid.compute(error, model.time_step)
             index = model.joint_index(self._joint)
             model.body.add_effort(index, clamp(effort, -mimic.effort, mimic.effort))
 

@@ -42,14 +42,9 @@ class ControlledRobot:
     """Copies joint states into ros_control's handles, and commands back, once a tick."""
 
     def __init__(
-        self,
-        model: Model,
-        hardware: RobotHardware,
-        manager: ControllerManager,
-        control_period: float = 0.0,
-        namespace: str = "/",
-        log: Log = logger.log,
-    ) -> None:
+        self, model: Model, hardware: RobotHardware, manager: ControllerManager,
+        control_period: float = 0.0, namespace: str = "/", log: Log = logger.log,
+    ) -> None:  # fmt: skip
         """
         Args:
             model: The robot in the world.

@@ -11,6 +11,7 @@ from file_access.text import one_line
 from robot_sim.applied_forces import AppliedForces
 from robot_sim.constants import NANOSECONDS
 from robot_sim.fingerprint import check_foreign, fingerprint, misfits
+from robot_sim.grippers import PidFollower
 from robot_sim.moves import Moves
 from robot_sim.physics.engine import Twist
 from robot_sim.physics.model import Model
@@ -348,9 +349,10 @@ class Simulator(Shared):
     @property
     def fits(self) -> dict[str, Any]:
         """What a world must share to restore its snapshots. The caller holds the lock."""
-        version = self.version, [robot.manager.running for robot in self.robots]
+        followers = {name: each for name, each in self.parts.items() if isinstance(each, PidFollower)}
+        version = self.version, [robot.manager.running for robot in self.robots], [*followers]
         if self._fits_version != version:
-            self._fits_version, self._fits = version, fingerprint(self.world, self._by_name)
+            self._fits_version, self._fits = version, fingerprint(self.world, self._by_name, followers)
         return self._fits
 
     def reseed(self, seed: int) -> None:

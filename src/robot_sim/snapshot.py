@@ -13,7 +13,7 @@ from file_access.content import FileError, read_file
 from robot_sim.plain_data import entries_of, pack, unpack
 from robot_sim.state_dict import StateError
 
-MAGIC = b"robot snapshot 1\n"
+MAGIC = b"robot snapshot 2\n"
 DIGEST = 32  # [bytes], of SHA-256
 LARGEST = 256 * 2**20  # [bytes] of a file
 SURELY_READ = 2**16  # [bytes]; what has no more can't exceed the limits of `unpack`

@@ -4,7 +4,6 @@ See docs/contract/sensors.md 11.3 and 11.5.
 """
 
 import math
-from collections import deque
 
 import rospy
 from geometry_msgs.msg import Wrench
@@ -127,7 +126,7 @@ class JointPoseTrajectoryPlugin(ContextPlugin):
             self._stop()
 
     def _stop(self) -> None:
-        self._points: deque[tuple[int, dict[str, float]]] = deque()
+        self._points: list[tuple[int, dict[str, float]]] = []
         self._held: dict[str, float] = {}
         self._end = 0  # [ns]
         self._kept: tuple[str, Pose] | None = None  # a link that stays where it is
@@ -159,7 +158,7 @@ class JointPoseTrajectoryPlugin(ContextPlugin):
     def _update(self, now: int) -> None:
         if self._points and self._period.is_over(now):
             while self._points and self._points[0][0] <= now:
-                self._held = self._points.popleft()[1]
+                self._held = self._points.pop(0)[1]
         if not self._held:
             return
         self._model.set_joint_positions(self._held)

@@ -193,14 +193,9 @@ class SensorView:
     """A topic: its checkbox, its subscriber while it is switched on, its nodes on the page."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        folder: viser.GuiFolderHandle,
-        sensor: SceneSensor,
-        name: str,
-        kind: type,
-        draw: Callable[[Any], Drawing],
-    ) -> None:
+        self, server: viser.ViserServer, folder: viser.GuiFolderHandle, sensor: SceneSensor, name: str,
+        kind: type, draw: Callable[[Any], Drawing],
+    ) -> None:  # fmt: skip
         """`folder` gets its checkbox and picture, `name` is that of its nodes; `draw` draws a `kind`."""
         self.sensor = sensor
         self._server, self._folder, self._name = server, folder, name

@@ -36,6 +36,7 @@ def fill(sim: Simulator, source: Source | None) -> None:
     sim.set_time_step(world.time_step)
     sim.world.set_gravity(world.gravity)
     sim.world.set_solver(world.solver)
+    sim.world.lights.update(world.lights)
     for name, error in fill_world(sim.world, world.models):
         if error is not None:
             raise RobotEnvError(f"world {_shown(source)}: model '{name}': {error}") from error

@@ -131,7 +131,7 @@ class Sensor:
         return {
             "sensor_delay": (self._seen.maxlen or 1) - 1,
             "encoder_step": {name: e.step for name, e in joints},
-            "sensor_noise": [[(name, *e[:2]) for name, e in joints], self._sensors],
+            "sensor_noise": [[(name, *e[:2]) for name, e in joints], [*self._sensors.items()]],
         }  # fmt: skip
 
     def state_dict(self) -> dict[str, Any]:

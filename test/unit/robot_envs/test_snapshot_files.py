@@ -359,7 +359,7 @@ def test_a_simulators_snapshot_and_another_version_are_named():
     with pytest.raises(SnapshotError, match="an array in what it fits"):
         Snapshot.from_bytes(Snapshot({"engine": np.zeros(2)}, {}).to_bytes())
     with pytest.raises(SnapshotError, match="of another version"):
-        EnvSnapshot.from_bytes(b"robot snapshot 2\n" + bytes(50))
+        EnvSnapshot.from_bytes(b"robot snapshot 1\n" + bytes(50))
 
 
 def test_a_file_of_the_same_task_with_other_spaces_is_refused_and_the_episode_goes_on() -> None:

@@ -8,12 +8,13 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
+from support.robots import grippers
 from support.scenes.play import play
 
 import robot_envs.robots  # noqa: F401 - registers the environments
 from cartpole.robot import ROBOT
 from cartpole.tasks import SwingUpTask
-from robot_envs import EnvSnapshot, Pose, RobotEnv, SimulatorError, StateQuery
+from robot_envs import EnvSnapshot, Pose, Robot, RobotEnv, SimulatorError, StateQuery, Task
 from robot_sim.physics.description import Light
 from robot_sim.state_dict import StateError
 
@@ -68,9 +69,48 @@ def exchange(parameters) -> None:
 )  # fmt: skip
 def test_other_joints_gains_limits_and_settings_of_controllers_dont_fit(made, identifier, change) -> None:
     one, other = configured(identifier, made, change)
-    with pytest.raises(SimulatorError, match="controllers or limits aren't those of the snapshot"):
+    with pytest.raises(SimulatorError, match="controllers, gains or limits aren't those of the snapshot"):
         other.restore_state(filed(one))
     one.restore_state(filed(one))
+
+
+class Lifting(Task):
+    def action_space(self):
+        return gymnasium.spaces.Box(-1.0, 1.0, (1,))
+
+    def observation_space(self):
+        return gymnasium.spaces.Box(-9.0, 9.0, (1,))
+
+    def apply(self, action, state):
+        return {"lift": float(action[0])}
+
+    def observe(self, state):
+        return np.array([each.position for each in state.joints.values()][:1], np.float32)
+
+    def reward(self, state, action):
+        return 0.0
+
+
+FOLLOWER = {"p": 100.0, "i": 5.0, "d": 0.1}
+
+
+@pytest.mark.parametrize("other", [{"right": {**FOLLOWER, "p": 50.0}}, {"lift": {"p": 9.0}}, {"right": None}])
+def test_other_gains_of_drives_and_followers_dont_fit(made, other) -> None:
+    follower = grippers.plugin(
+        "libroboticsgroup_upatras_gazebo_mimic_joint_plugin.so", joint="left", mimicJoint="right", hasPID=""
+    )
+    hand = grippers.gripper(mimic="", more=grippers.plugin("libgazebo_ros_control.so") + follower)
+    lift = {"type": "velocity_controllers/JointVelocityController", "joint": "lift"}
+
+    def lifting(gains) -> RobotEnv:
+        kept = {"gazebo_ros_control": {"pid_gains": {name: each for name, each in gains.items() if each}}}
+        return made(Robot(urdf=hand, controllers={"lift": lift, **kept}, run=("lift",)), Lifting())
+
+    one, another = lifting({"right": FOLLOWER}), lifting({"right": FOLLOWER, **other})
+    snapshot = filed(one)
+    with pytest.raises(SimulatorError, match="controllers, gains or limits"):
+        another.restore_state(snapshot)
+    one.restore_state(snapshot)
 
 
 def test_a_file_of_the_beginning_fits_where_a_control_period_has_begun(made) -> None:
@@ -113,6 +153,12 @@ def test_other_lights_dont_fit(made) -> None:
     world.version += 1
     with pytest.raises(SimulatorError, match="lights aren't those of the snapshot"):
         other.restore_state(snapshot)
+
+
+def test_lights_of_a_world_file_are_those_of_an_environment(made) -> None:
+    light = "<light name='sun' type='directional'><diffuse>0.3 0.3 0.3 1</diffuse></light>"
+    env = made(replace(ROBOT, world=f"<sdf version='1.6'><world name='w'>{light}</world></sdf>"))
+    assert [each.diffuse[:3] for each in env.backend._sim.world.lights.values()] == [(0.3, 0.3, 0.3)]
 
 
 class Watching(SwingUpTask):

@@ -39,12 +39,12 @@ class Side(Stateful):
     def __init__(self, joints: list[JointHandle], radius: float) -> None:
         self.joints = joints
         self.radius = radius
-        self._last = 0.0
+        self._turned = 0.0
 
     def travel(self) -> float:
         """Returns how far they have rolled since the last call, in the mean [m]."""
         turned = sum([joint.position for joint in self.joints]) / len(self.joints)
-        last, self._last = self._last, turned
+        last, self._turned = self._turned, turned
         return self.radius * (turned - last)
 
     def drive(self, speed: float) -> None:

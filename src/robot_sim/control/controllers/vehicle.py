@@ -105,7 +105,7 @@ class VehicleController(Controller):
 
     def _halt(self) -> None:
         self._wanted, self._stamp = REST, self._now
-        self._last = self._before = (0.0, 0.0)  # linear and angular, as commanded
+        self._limited = self._limited_before = (0.0, 0.0)  # linear and angular, as commanded
 
     @abstractmethod
     def remember(self) -> None:
@@ -163,7 +163,7 @@ class VehicleController(Controller):
     def update(self, now: int, dt: float) -> None:
         self._now = now
         if self.options.open_loop:
-            linear, angular = self._last
+            linear, angular = self._limited
             self._velocity = (linear, 0.0, self.turn_of(linear, angular))
             ahead, left, turn = (dt * each for each in self._velocity)
         else:
@@ -185,13 +185,13 @@ class VehicleController(Controller):
         return now - self._stamp > self.options.cmd_vel_timeout * NANOSECONDS
 
     def _limit(self, linear: float, angular: float, dt: float) -> tuple[float, float]:
-        options, last, before = self.options, self._last, self._before
-        self._before = last
-        self._last = (
+        options, last, before = self.options, self._limited, self._limited_before
+        self._limited_before = last
+        self._limited = (
             options.linear.limited(linear, last[0], before[0], dt),
             options.angular.limited(angular, last[1], before[1], dt),
         )
-        return self._last
+        return self._limited
 
     def report(self, now: int) -> None:
         """Sends the odometry at a time [ns]."""
