@@ -123,6 +123,7 @@ def training_curves(panels: Sequence[Panel], across: str) -> Figure:
         _finish(axes, panel, across, "return")
     about = f"mean of {WINDOW} episodes" + (", pale: each episode" if pale else "")
     figure.suptitle(f"training: {about}", fontsize="medium")
+    _name_curves(figure)
     return figure
 
 
@@ -139,6 +140,7 @@ def seed_curves(panels: Sequence[Panel]) -> Figure:
             _draw_seeds(axes, averages, f"{name} ({_seeds(seeds)})", styles[name])
         _finish(axes, panel, STEPS, f"return, mean of {WINDOW} episodes")
     _explain(figure, panels)
+    _name_curves(figure)
     return figure
 
 
@@ -231,7 +233,13 @@ def _finish(axes: Axes, panel: Panel, across: str, up: str) -> None:
     if panel.shows_success:
         axes.set_ylim(-0.05, 1.05)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize="small")
+
+
+def _name_curves(figure: Figure) -> None:
+    """Adds one legend below all panels for their curves."""
+    named = {each.get_label(): each for axes in figure.axes for each in axes.get_legend_handles_labels()[0]}
+    handles = [*named.values()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize="small", frameon=False)
 
 
 def _explain(figure: Figure, panels: Sequence[Panel], *more: Line2D) -> None:

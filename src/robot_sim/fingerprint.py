@@ -106,8 +106,7 @@ def misfits(given: Mapping[str, Any], here: Mapping[str, Any]) -> str:
         return f"the model '{others[0]}' has another description or initial pose than in the snapshot"
     if given.get("lights") != here["lights"]:
         return "the world's lights aren't those of the snapshot"
-    names = "robots", "followers"
-    one, other = ({name: fits.get(name) for name in names} for fits in (given, here))
+    one, other = ({name: fits.get(name) for name in ("robots", "followers")} for fits in (given, here))
     found = next(differences(one, other), "")
     return found and f"controllers, gains or limits aren't those of the snapshot: {found}"
 

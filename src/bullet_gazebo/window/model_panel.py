@@ -35,14 +35,9 @@ class ModelPanel:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        world: viser.FrameHandle,
-        commands: Commands,
-        controllers: Controllers,
-        attempt: Attempt,
-        stands: Callable[[], bool],
-    ) -> None:
+        self, server: viser.ViserServer, world: viser.FrameHandle, commands: Commands,
+        controllers: Controllers, attempt: Attempt, stands: Callable[[], bool],
+    ) -> None:  # fmt: skip
         self._server, self._world = server, world
         self._commands = commands
         self.controllers = controllers
